@@ -83,8 +83,8 @@ fn along_z(
     (frame, pixels): (f64, usize),
 ) -> LightProjection<'_> {
     let frame = screen_frame(frame, pixels).unwrap();
-    LightProjection::new(field, setup.clone(), SquareBeam::new(Z, half, 2.0), on(&setup, frame))
-        .unwrap()
+    let screens = on(&setup, frame);
+    LightProjection::new(field, setup, SquareBeam::new(Z, half, 2.0), screens).unwrap()
 }
 
 /// The root mean square difference from an exact image over what the errors of an image allow.

@@ -155,7 +155,7 @@ impl Display for MeasureMtfReport {
             }
             match optiland {
                 Some(found) => writeln!(f, "Optiland {}, each wavelength alone", found.version)?,
-                None => writeln!(f, "{}", HOW_TO_GET)?,
+                None => writeln!(f, "{HOW_TO_GET}")?,
             }
         }
         Ok(())

@@ -138,14 +138,21 @@ fn beside_optiland(found: &OptilandTolerances) -> String {
     let ms = |ms: f64| format!("{} ms", ShortNumber(ms));
     let times = [own.setup_ms, own.sensitivities_ms, own.lens_ms].map(ms);
     let [ready, sensitivities, lens] = times;
-    table.row(["this program".into(), ready, sensitivities, own.rays.to_string(), lens, "".into()]);
+    table.row([
+        "this program".into(),
+        ready,
+        sensitivities,
+        own.rays.to_string(),
+        lens,
+        String::new(),
+    ]);
     for other in rows {
         let [sensitivities, lens] = [other.sensitivities_ms, other.lens_ms].map(ms);
         let apart = other.median_difference.map_or(String::new(), |(share, count)| {
             format!("{:.1} % (median of {count})", 100.0 * share)
         });
         let program = format!("Optiland {version}");
-        table.row([program, "".into(), sensitivities, other.rays.to_string(), lens, apart]);
+        table.row([program, String::new(), sensitivities, other.rays.to_string(), lens, apart]);
     }
     format!(
         "{table}{errors} errors of single surfaces, image plane fixed; off: growth of the mean square spot\n"

@@ -360,7 +360,7 @@ mod tests {
         let lens = finish(&candidate, &asked, &AtomicBool::new(true)).unwrap();
         let of = |merit, elements: usize, rms: f64| DesignedLens {
             merit,
-            judgement: LensJudgement { elements, rms, ..judgement.clone() },
+            judgement: LensJudgement { rms, elements, ..judgement.clone() },
             costs: Vec::new(),
             as_built: None,
             ..lens.clone()

@@ -41,23 +41,23 @@ fn ask<T: DeserializeOwned>(
         let threads = format!("{library}_NUM_THREADS");
         command.env(threads, "1");
     }
-    let output = command.output().map_err(|error| wrong(python, error.to_string()))?;
+    let output = command.output().map_err(|error| wrong(python, &error.to_string()))?;
     if !output.status.success() {
         let text = String::from_utf8_lossy(&output.stderr);
         let last = text.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("no message");
-        return Err(wrong(python, last.to_owned()));
+        return Err(wrong(python, last));
     }
     let text = String::from_utf8_lossy(&output.stdout);
     let line = text.lines().last().unwrap_or_default();
-    serde_json::from_str(line).map_err(|error| wrong(python, error.to_string()))
+    serde_json::from_str(line).map_err(|error| wrong(python, &error.to_string()))
 }
 
 /// The error of an interpreter that does not answer as it should.
-fn wrong(python: &Path, what: String) -> CliError {
+fn wrong(python: &Path, what: &str) -> CliError {
     CliError::Failed(format!("{}: {what}", python.display()))
 }
 
 /// The error of an answer with another number of values than were asked for.
 fn wrong_shape(python: &Path) -> CliError {
-    wrong(python, "its answer has not the shape of the question".to_owned())
+    wrong(python, "its answer has not the shape of the question")
 }

@@ -105,12 +105,13 @@ fn median_difference(own: &[f64], others: &[Option<f64>]) -> Option<(f64, usize)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lens::Perturbation;
+    use crate::lens::{ErrorDistribution, Perturbation};
 
     #[test]
     fn errors_are_named_by_surfaces_counted_from_the_object() {
         let error = Perturbation::of_surface(PerturbationKind::SurfaceTiltY, 3);
-        let tolerance = Tolerance { error, half_range: 1e-3, distribution: Default::default() };
+        let distribution = ErrorDistribution::default();
+        let tolerance = Tolerance { error, half_range: 1e-3, distribution };
         assert_eq!(name_error(&tolerance), Some(json!(["tilt", 4, "y", 1e-3])));
         let error = Perturbation::of_surface(PerturbationKind::Irregularity, 3);
         assert_eq!(name_error(&Tolerance { error, ..tolerance }), None);
