@@ -54,7 +54,7 @@ pub struct TermCosts {
     pub rows: Vec<TermCost>,
 }
 
-/// How many times as accurate the rays are by which the error of a gradient is found.
+/// The factor by which the rays are more accurate that tell the error of a gradient.
 const FINER: f64 = 20.0;
 /// The times that a value is timed.
 const TURNS: usize = 15;

@@ -78,7 +78,7 @@ pub(super) fn predict_unless(
     unless_stopped(as_built(lens, settings, (tolerance, 0), stop))
 }
 
-/// What was found, or the reason why it was not in words; `None` if it was stopped.
+/// The result, or the reason in words why there is none; `None` if it was stopped.
 fn unless_stopped<T>(found: Result<T, ToleranceError>) -> Option<Result<T, String>> {
     match found {
         Err(ToleranceError::Stopped) => None,

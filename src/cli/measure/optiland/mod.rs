@@ -11,7 +11,7 @@ use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// How to get the program that the scripts need.
+/// The note on how to get the program that the scripts need.
 pub(super) const HOW_TO_GET: &str = "Optiland: not run; `python -m venv optiland`, \
      `optiland/bin/pip install optiland`, then --optiland optiland/bin/python";
 
