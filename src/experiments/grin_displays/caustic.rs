@@ -128,7 +128,7 @@ fn rings(
 struct ExitBeam {
     rays: Vec<([f64; 2], [f64; 2])>,
     all: usize,
-    /// The light before the field, the way it is traced, and the z at which the field ends.
+    /// The light before the field, the way it is traced onto screens, and the z at which the field ends.
     beam: SquareBeam,
     setup: GrinSetup<f64>,
     back: f64,
@@ -141,8 +141,7 @@ impl ExitBeam {
         let (space, rays) = task.scoring_rays(&task.views[0]);
         let plan =
             plan_tracing(medium.index_field(), &space.region(), task.launch, &rays, TOLERANCE);
-        let setup = plan?.setup;
-        let tracer = GrinTracer::new(medium.index_field(), setup.clone())?;
+        let tracer = GrinTracer::new(medium.index_field(), plan?.setup)?;
         let exits = tracer.trace_batch(&rays);
         let arrived = exits.iter().filter(|exit| exit.fate.has_arrived() && exit.v.z > 0.0);
         let back = space.corners()[1].z;
@@ -154,6 +153,8 @@ impl ExitBeam {
         let beam = task.views[0].source.beam(space);
         let beam =
             beam.ok_or_else(|| ExperimentError::Failed("rings without a beam".to_owned()))?;
+        // A pixel needs no rays that are as accurate: those of a tight plan take hundreds of times as long.
+        let setup = task.tracing_setups(medium)?.swap_remove(0);
         Ok(Self { rays: arrived.map(ray).collect(), all: rays.len(), beam, setup, back })
     }
 

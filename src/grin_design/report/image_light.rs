@@ -32,6 +32,14 @@ impl GrinTask {
         self.views.iter().zip(setups).map(light).collect()
     }
 
+    /// The way in which the rays of every view are traced through a field.
+    ///
+    /// # Errors
+    /// A domain without extent.
+    pub fn tracing_setups(&self, field: &GrinField) -> Result<Vec<GrinSetup<f64>>, GrinTaskError> {
+        plan_views(self, field.index_field(), RaySet::Scoring)
+    }
+
     fn light_of(
         &self,
         view: &LightView,
