@@ -3,8 +3,12 @@
 //!
 //! The gradient of a trilinear field jumps at the faces of its voxels. A Hessian without these
 //! jumps is the exact derivative of the computation but not of the physical rays: for fine and
-//! rough fields it misleads the optimization, and the smoothed one is better. A spline has no
-//! jumps.
+//! rough fields it misleads the optimization. A spline has no jumps.
+//!
+//! Two claims fail. By the light on its pixels, the image of the smoothed Hessian is worse than that of the exact one
+//! at 33 nodes, by 0.08 dB, and the last refinement of the splines gains 0.4 dB in place of 0.5. The image of the
+//! loss, in which each ray is spread over nine pixels, gains 0.3 dB and 3.4 dB: finer fields sharpen what the loss
+//! sees, and leave noise between its rays that it does not see.
 
 use super::{EvaluatedView, SOLVING, evaluate, part_of, reduced, sampling_claims, solve_from};
 use crate::analysis::Estimate;
