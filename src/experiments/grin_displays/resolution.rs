@@ -7,8 +7,8 @@
 //!
 //! Two claims fail. By the light on its pixels, the image of the smoothed Hessian is worse than that of the exact one
 //! at 33 nodes, by 0.08 dB, and the last refinement of the splines gains 0.4 dB in place of 0.5. The image of the
-//! loss, in which each ray is spread over nine pixels, gains 0.3 dB and 3.4 dB: finer fields sharpen what the loss
-//! sees, and leave noise between its rays that it does not see.
+//! loss, in which each ray is spread over nine pixels, gains 0.3 dB and 3.4 dB: what its footprint smooths away is no
+//! part of the loss.
 
 use super::{EvaluatedView, SOLVING, evaluate, part_of, reduced, sampling_claims, solve_from};
 use crate::analysis::Estimate;
