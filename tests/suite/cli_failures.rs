@@ -581,7 +581,12 @@ fn are_saved_when_asked_to_end(folder: &Folder, wait: u64) -> bool {
 /// A benchmark of nothing has no result.
 #[test]
 fn no_repetition_is_wrong_input() {
-    for command in [["measure", "trace", "--turns", "0"], ["measure", "optimize", "--steps", "0"]] {
+    let none = [
+        ["measure", "trace", "--turns", "0"],
+        ["measure", "optimize", "--steps", "0"],
+        ["measure", "tolerance", "--samples", "0"],
+    ];
+    for command in none {
         refused(2, &command, "", &[command[2], "found 0; expected 1 or more"]);
     }
 }

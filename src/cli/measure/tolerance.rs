@@ -47,6 +47,9 @@ const SENSITIVE: &str = "double_gauss_canon_ef50_f18";
 
 impl MeasureToleranceArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        if self.samples == 0 {
+            return Err(CliError::Input("--samples: found 0; expected 1 or more".into()));
+        }
         let (lens, file) = self.lens()?;
         let fail = |e: ToleranceBenchmarkError| CliError::Failed(format!("{file}: {e}"));
         let stop = stop_flag();

@@ -41,7 +41,8 @@ fn ask<T: DeserializeOwned>(
         let threads = format!("{library}_NUM_THREADS");
         command.env(threads, "1");
     }
-    let output = command.output().map_err(|error| wrong(python, &error.to_string()))?;
+    let not_run = |error| CliError::Input(format!("--optiland {}: {error}", python.display()));
+    let output = command.output().map_err(not_run)?;
     if !output.status.success() {
         let text = String::from_utf8_lossy(&output.stderr);
         let last = text.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("no message");
