@@ -108,12 +108,13 @@ impl ImageReport {
         let pair = |found: Estimate| [found.value, found.error];
         let light = &seen.light;
         let lost = light.fates.iter().filter(|(fate, _)| !fate.has_arrived());
+        let error = light.rms_error();
         Self {
             view: view.to_owned(),
-            quality_db: light.rms_error().map(|_| pair(seen.quality())),
-            correlation: light.rms_error().map(|_| pair(seen.correlation())),
+            quality_db: error.map(|_| pair(seen.quality())),
+            correlation: error.map(|_| pair(seen.correlation())),
             light: pair(light.light()),
-            error: light.rms_error(),
+            error,
             reached: light.reached,
             rays: light.rays,
             lost: lost.map(|(fate, count)| (fate.name(), count)).collect(),
