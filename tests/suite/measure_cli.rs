@@ -71,10 +71,10 @@ fn another_program_is_compared_in_the_same_run() {
     let text = done(&["measure", "mtf", LENS, "--count", "1", "--highest", "2"], "");
     assert!(text.contains("pip install optiland"), "{text}");
     refused(
-        1,
+        2,
         &["measure", "mtf", LENS, "--count", "1", "--optiland", "no-python"],
         "",
-        &["no-python"],
+        &["--optiland", "no-python"],
     );
 }
 
