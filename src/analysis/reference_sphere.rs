@@ -83,7 +83,8 @@ pub(super) struct ReferenceSphere {
     pub(super) center: Vec3<f64>,
     /// The pupil point of the ray that ends there.
     pub(super) chief: [f64; 2],
-    direction: Vec3<f64>,
+    /// The direction of the chief ray.
+    pub(super) direction: Vec3<f64>,
     /// The optical path of the chief ray to the image, in mm.
     pub(super) path: f64,
     pub(super) form: ReferenceForm,

@@ -1,9 +1,11 @@
 //! Progress and interruption of a long run: a bar on standard error, and the signals that end it.
 
 use super::output::print_note;
+use crate::measure::Stopwatch;
 use indicatif::{ProgressBar, ProgressStyle};
 #[cfg(unix)]
 use signal_hook::consts::{SIGHUP, SIGTERM};
+use std::io::{IsTerminal as _, stderr};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock};
@@ -80,6 +82,41 @@ pub(super) fn styled_bar(steps: usize, template: &str) -> ProgressBar {
     let style = ProgressStyle::with_template(template);
     let bar = ProgressBar::new(steps as u64);
     bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+/// Lines on standard error that say where a long run is: the first after ten seconds, each of the others after
+/// twice the time, at most ten minutes, so that a log of a day stays short.
+#[derive(Debug)]
+pub(super) struct ProgressNotes {
+    clock: Stopwatch,
+    /// The seconds at which the next line is due, and those from it to the one after.
+    due: f64,
+    pause: f64,
+}
+
+impl ProgressNotes {
+    const FIRST: f64 = 10.0;
+    const LONGEST: f64 = 600.0;
+
+    pub(super) fn new() -> Self {
+        Self { clock: Stopwatch::start(), due: Self::FIRST, pause: Self::FIRST }
+    }
+
+    /// Those of a run with a bar, which is shown on a terminal only: `None` there.
+    pub(super) fn in_place_of_bar() -> Option<Self> {
+        (!stderr().is_terminal()).then(Self::new)
+    }
+
+    /// Prints a line if one is due.
+    pub(super) fn tell(&mut self, text: impl FnOnce() -> String) {
+        let seconds = self.clock.seconds();
+        if seconds < self.due {
+            return;
+        }
+        print_note(format!("after {seconds:.0} s: {}", text()));
+        self.pause = (2.0 * self.pause).min(Self::LONGEST);
+        self.due = seconds + self.pause;
+    }
 }
 
 /// Runs work that reports how many of its parts are done, with a bar that counts them. A request to

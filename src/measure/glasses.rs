@@ -5,9 +5,9 @@ use super::timing::Stopwatch;
 use crate::lens::Lens;
 use crate::lens::glass;
 use crate::merit::Goal;
-use crate::optimize::{DescentMethod, GlassRound, GlassSearch, GlassSearchError, start};
+use crate::optimize::{DescentMethod, GlassSearch, GlassSearchError, start};
 use serde::Serialize;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::ops::ControlFlow;
 
 /// The steps of the descent before glasses are exchanged.
 const DESCENT_STEPS: usize = 400;
@@ -27,89 +27,145 @@ pub struct GlassGain {
     pub evaluations: usize,
     /// The time of the exchange in seconds.
     pub seconds: f64,
-    /// The merit by exchanges in a random order with as many evaluations.
-    pub merit_random: f64,
+    /// True if no further exchange gains; false if it was ended before.
+    pub finished: bool,
+    /// The merit by exchanges in a random order with as many evaluations; `None` if they were ended before.
+    pub merit_random: Option<f64>,
 }
 
-/// Optimizes a lens, then exchanges its glasses for any of the catalogue, in an order by a seed. A lens
-/// without a goal gets the default one, a lens without variables all curvatures and thicknesses. `None` once
-/// `stop` is true.
+/// What of a measurement is going on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GlassPhase {
+    /// The descent with the glasses of the lens.
+    Descent,
+    /// The exchange in the order of predictions.
+    Guided,
+    /// The exchange in a random order.
+    Random,
+}
+
+/// Where a measurement is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GlassProgress {
+    /// What is going on.
+    pub phase: GlassPhase,
+    /// The evaluations of it so far.
+    pub evaluations: usize,
+    /// The merit so far.
+    pub merit: f64,
+    /// The exchanges so far.
+    pub exchanges: usize,
+}
+
+/// The caller of a measurement, who is told where it is and may end it.
+type GlassWatch<'a> = dyn FnMut(GlassProgress) -> ControlFlow<()> + 'a;
+
+/// Optimizes a lens, then exchanges its glasses for any of the catalogue, in an order by a seed, until nothing
+/// gains or `most` evaluations are used. A lens without a goal gets the default one, a lens without variables all
+/// curvatures and thicknesses. Ended by `watch`, it gives what was found so far; `None` if no glass was exchanged.
 ///
 /// # Errors
 /// A lens without glasses to exchange, or without a merit.
 pub fn measure_glass_gain(
     lens: &Lens,
-    seed: u64,
-    tolerance: f64,
-    stop: &AtomicBool,
+    (seed, tolerance): (u64, f64),
+    most: Option<usize>,
+    watch: &mut GlassWatch<'_>,
 ) -> Result<Option<GlassGain>, GlassSearchError> {
     let first = with_variables(lens);
     let goal = Goal::of_lens(&first)?;
     let mut search = GlassSearch::new(&first, &goal, tolerance, glass::catalogue(), seed)?;
     let merit_before = search.merit();
-    let mut optimizer = start(DescentMethod::TrustRegion, &first, &goal, tolerance)?;
-    for _ in 0..DESCENT_STEPS {
-        if stop.load(Ordering::Relaxed) {
-            return Ok(None);
-        }
-        if optimizer.step().finished {
-            break;
-        }
-    }
-    optimizer.verify_best();
-    let lens = optimizer.best();
-    search.restart(lens)?;
-    let watch = Stopwatch::start();
+    let Some(lens) = descended(&first, &goal, tolerance, watch)? else { return Ok(None) };
+    search.restart(&lens)?;
+    let clock = Stopwatch::start();
     let merit_optimized = search.merit();
-    let Some((rounds, exchanges)) = search_to_end(&mut search, stop)? else { return Ok(None) };
-    let seconds = watch.seconds();
+    let guided = exchange(&mut search, (GlassPhase::Guided, most), watch)?;
+    let seconds = clock.seconds();
     let mut random = GlassSearch::new(&first, &goal, tolerance, glass::catalogue(), seed)?;
     random = random.without_predictions();
-    random.restart(lens)?;
-    let Some(merit_random) = merit_after(&mut random, rounds.evaluations, stop)? else {
-        return Ok(None);
+    random.restart(&lens)?;
+    let limit = (GlassPhase::Random, Some(guided.evaluations));
+    let merit_random = if guided.is_ended_early {
+        None
+    } else {
+        let found = exchange(&mut random, limit, watch)?;
+        (!found.is_ended_early).then_some(found.merit)
     };
     Ok(Some(GlassGain {
         merit_before,
         merit_optimized,
-        merit: rounds.merit,
-        exchanges,
-        evaluations: rounds.evaluations,
+        merit: guided.merit,
+        exchanges: guided.exchanges,
+        evaluations: guided.evaluations,
         seconds,
+        finished: guided.is_finished,
         merit_random,
     }))
 }
 
-/// The last round of a search, and the exchanges that were taken; `None` once `stop` is true.
-fn search_to_end(
-    search: &mut GlassSearch,
-    stop: &AtomicBool,
-) -> Result<Option<(GlassRound, usize)>, GlassSearchError> {
-    let mut exchanges = 0;
-    while !stop.load(Ordering::Relaxed) {
-        let round = search.round()?;
-        exchanges += usize::from(round.accepted.is_some());
-        if round.finished {
-            return Ok(Some((round, exchanges)));
+/// A lens after a descent with its glasses; `None` once `watch` ends it.
+fn descended(
+    lens: &Lens,
+    goal: &Goal,
+    tolerance: f64,
+    watch: &mut GlassWatch<'_>,
+) -> Result<Option<Lens>, GlassSearchError> {
+    let mut optimizer = start(DescentMethod::TrustRegion, lens, goal, tolerance)?;
+    for _ in 0..DESCENT_STEPS {
+        let step = optimizer.step();
+        let (evaluations, merit) = (step.evaluations, step.best);
+        let phase = GlassPhase::Descent;
+        if watch(GlassProgress { phase, evaluations, merit, exchanges: 0 }).is_break() {
+            return Ok(None);
+        }
+        if step.finished {
+            break;
         }
     }
-    Ok(None)
+    optimizer.verify_best();
+    Ok(Some(optimizer.best().clone()))
 }
 
-/// The merit of a search after this many evaluations, which begins anew from its best lens where it ends
-/// before; `None` once `stop` is true.
-fn merit_after(
-    search: &mut GlassSearch,
+/// The end of an exchange.
+struct ExchangeEnd {
+    merit: f64,
+    exchanges: usize,
     evaluations: usize,
-    stop: &AtomicBool,
-) -> Result<Option<f64>, GlassSearchError> {
-    let mut merit = search.merit();
-    while !stop.load(Ordering::Relaxed) {
+    /// True if nothing further gains.
+    is_finished: bool,
+    /// True if `watch` ended it.
+    is_ended_early: bool,
+}
+
+/// Exchanges glasses until nothing gains, or a round takes more than the evaluations that it may: that round
+/// does not count. A search in a random order begins anew from its best lens where it ends before.
+fn exchange(
+    search: &mut GlassSearch,
+    (phase, most): (GlassPhase, Option<usize>),
+    watch: &mut GlassWatch<'_>,
+) -> Result<ExchangeEnd, GlassSearchError> {
+    let mut end = ExchangeEnd {
+        merit: search.merit(),
+        exchanges: 0,
+        evaluations: 0,
+        is_finished: false,
+        is_ended_early: false,
+    };
+    loop {
         let round = search.round()?;
-        if round.evaluations > evaluations {
-            return Ok(Some(merit));
+        if most.is_some_and(|most| round.evaluations > most) {
+            return Ok(end);
         }
-        merit = round.merit;
+        end.merit = round.merit;
+        end.exchanges += usize::from(round.accepted.is_some());
+        end.evaluations = round.evaluations;
+        let ExchangeEnd { merit, exchanges, evaluations, .. } = end;
+        if phase == GlassPhase::Guided && round.finished {
+            return Ok(ExchangeEnd { is_finished: true, ..end });
+        }
+        if watch(GlassProgress { phase, evaluations, merit, exchanges }).is_break() {
+            return Ok(ExchangeEnd { is_ended_early: true, ..end });
+        }
     }
-    Ok(None)
 }

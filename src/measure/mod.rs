@@ -34,7 +34,7 @@ pub use arrival::{ArrivalComparison, ArrivalRow, measure_arrival};
 pub use design::{SheetReference, SheetScore, SpecificationSheet, measure_design};
 pub use double_gauss::double_gauss;
 pub use effects::EffectTask;
-pub use glasses::{GlassGain, measure_glass_gain};
+pub use glasses::{GlassGain, GlassPhase, GlassProgress, measure_glass_gain};
 pub use gradient::{
     GradientBenchmark, GradientBenchmarkError, GradientCost, GradientCurves, GradientRow, Integral,
     ParameterClass, measure_gradients,

@@ -40,6 +40,8 @@ pub struct DiffractionReport {
     /// The number of points of the picture that were compared; 0 if the bound decided, or if no comparison is
     /// possible.
     pub points: usize,
+    /// The reason why the spread is that of a pupil without aberrations where those matter.
+    pub without_aberrations: Option<&'static str>,
     /// The reason of the decision.
     pub reason: &'static str,
 }
@@ -100,6 +102,7 @@ impl DiffractionLight {
             frequency,
             points: 0,
             reason,
+            without_aberrations: None,
         };
         let off = |reason| Ok(Self { report: without(reason), parts: None });
         if bound <= tolerance {
@@ -122,7 +125,12 @@ impl DiffractionLight {
         let change = contrasts.largest(PlaceContrast::change);
         let matters = change > tolerance;
         let lens = AberratedLens { model, bands, directions: &directions, scene };
-        let (mut spreads, left) = contrasts.better(spreads, &lens, (reach, tolerance), matters);
+        let trial = contrasts.aberrated(&spreads, &lens, (reach, tolerance), matters);
+        let left = contrasts.largest(|place| place.left(&spreads, true));
+        let (mut spreads, left, refused) = match trial {
+            Ok((own, less)) => (own, less, None),
+            Err(why) => (spreads, left, why),
+        };
         let on = matters && left < change;
         let aberrated = on && spreads.aimed.is_some();
         let report = DiffractionReport {
@@ -134,6 +142,7 @@ impl DiffractionLight {
             cut: if on { spreads.cut(longest) } else { 0.0 },
             points: contrasts.0.len(),
             reason: if aberrated { ABERRATED } else { reason([on, matters, left > tolerance]) },
+            without_aberrations: refused,
             ..without("")
         };
         spreads.is_even = report.variation <= tolerance;
@@ -176,22 +185,27 @@ impl Contrasts {
         self.0.iter().map(error).fold(0.0, f64::max)
     }
 
-    /// These spreads of pupils alone, or those with aberrations where they matter and leave less; and what they leave.
-    fn better(
+    /// The spreads of pupils with their aberrations and what they leave, if they matter and leave less than those
+    /// of pupils alone; else the reason why not, if pupils alone are not good enough.
+    fn aberrated(
         &self,
-        plain: PupilSpreads,
+        plain: &PupilSpreads,
         lens: &AberratedLens<'_>,
         (reach, tolerance): (f64, f64),
         matters: bool,
-    ) -> (PupilSpreads, f64) {
-        let left = self.largest(|place| place.left(&plain, true));
-        let tried = matters && left > tolerance && lens.scene.is_at_one_distance();
-        let found = tried.then(|| lens.spreads(reach, plain.margin)).flatten();
-        let other = found.map(|own| (self.largest(|place| place.left(&own, false)), own));
-        match other {
-            Some((less, own)) if less < left => (own, less),
-            _ => (plain, left),
+    ) -> Result<(PupilSpreads, f64), Option<&'static str>> {
+        let left = self.largest(|place| place.left(plain, true));
+        if !matters || left <= tolerance {
+            return Err(None);
         }
+        if !lens.scene.is_at_one_distance() {
+            return Err(Some("the scene is not at one distance"));
+        }
+        let own = lens.spreads(reach, plain.margin);
+        let own =
+            own.ok_or(Some("a chief ray is lost, or they turn the phase too fast for a table"))?;
+        let less = self.largest(|place| place.left(&own, false));
+        if less < left { Ok((own, less)) } else { Err(Some("they would leave no less")) }
     }
 }
 

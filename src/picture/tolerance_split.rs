@@ -48,9 +48,14 @@ impl ToleranceSplit {
 
     /// The part that the others leave for an effect, and never less than its own share.
     pub fn rest(&self, effect: &str) -> f64 {
-        let others = self.shares.iter().filter(|share| share.effect != effect);
-        let square: f64 = others.map(|share| share.used * share.used).sum();
+        let square = self.without(effect).powi(2);
         (self.tolerance * self.tolerance - square).max(0.0).sqrt().max(self.allowed())
+    }
+
+    /// The error of all effects but one.
+    pub fn without(&self, effect: &str) -> f64 {
+        let others = self.shares.iter().filter(|share| share.effect != effect);
+        others.map(|share| share.used * share.used).sum::<f64>().sqrt()
     }
 
     /// The error of all effects: the root of the sum of their squares.
@@ -78,6 +83,7 @@ mod tests {
         // One that takes too much leaves the others their own share, and the error says so.
         split.note("diffraction", 0.2);
         assert_eq!(split.rest("sampling"), split.allowed());
+        assert!((split.without("sampling") - 0.2).abs() < 1e-15);
         split.note("sampling", 0.0);
         assert!((split.error() - 0.2).abs() < 1e-15);
         split.share_with("blur");

@@ -4,6 +4,7 @@
 
 mod analysis;
 mod aperture;
+mod brightest;
 mod candidate;
 mod cli;
 mod cli_arguments;

@@ -31,7 +31,7 @@ pub struct PupilSamples {
 const FEW: usize = 2;
 /// The nodes along a radius for each turn of the phase from which on Gauss rules converge: sums over fewer are
 /// as small as those of a dark place, and agree with each other.
-const NODES_PER_TURN: f64 = PI;
+pub(super) const NODES_PER_TURN: f64 = PI;
 
 /// A complex number as its real and imaginary part.
 pub(super) type Complex = [f64; 2];
@@ -79,7 +79,7 @@ impl PupilSamples {
 
     /// The turns of the phase over a radius of the pupil, in the light towards a point of the image at a
     /// distance from the centre of the sphere in mm: those of the path differences and those of the way.
-    fn turns(&self, reach: f64) -> f64 {
+    pub(super) fn turns(&self, reach: f64) -> f64 {
         let most = self.waves.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let least = self.waves.iter().copied().fold(f64::INFINITY, f64::min);
         most - least + self.spread() * reach / self.wavelength

@@ -16,6 +16,7 @@ pub(super) struct PointSpreadJson {
     strehl: Estimate,
     best_strehl: Estimate,
     best_at: [f64; 3],
+    best_is_global: bool,
     center: [f64; 2],
     reference: ReferenceForm,
     reached: bool,
@@ -104,6 +105,7 @@ fn keys(spread: &PointSpread, strehl: Strehl, points: &[[f64; 2]], ms: f64) -> P
         strehl: timed(spread.strehl),
         best_strehl: timed(strehl.best),
         best_at: strehl.best_at,
+        best_is_global: strehl.is_brightest,
         center: spread.center,
         reference: spread.reference,
         reached: spread.reached && strehl.reached,
@@ -128,6 +130,9 @@ impl TextLines for PointSpreadJson {
             estimate_text("best Strehl", &self.best_strehl),
             format!("found at x {x}, y {y}, along the axis {z} mm"),
         ];
+        if !self.best_is_global {
+            lines.push("a local maximum: the blur is too large to be searched".to_owned());
+        }
         lines.push(format!("{:>12}  {:>12}  intensity", "x, mm", "y, mm"));
         lines.extend(self.points.iter().map(|point| {
             let IntensityJson { x, y, intensity } = point;

@@ -2,10 +2,13 @@
 
 use crate::cli::error::CliError;
 use crate::cli::input::{LensFiles, Tolerance};
-use crate::cli::output::{Output, ShortNumber, TextTable};
-use crate::measure::{GlassGain, Machine, measure_glass_gain};
+use crate::cli::output::{Output, ShortNumber, TextTable, counted};
+use crate::cli::progress::ProgressNotes;
+use crate::measure::{GlassGain, GlassPhase, GlassProgress, Machine, measure_glass_gain};
 use serde::Serialize;
 use std::fmt::{self, Display};
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The merit of optimized lenses before and after an exchange of their glasses
 #[derive(Debug, clap::Args)]
@@ -21,12 +24,29 @@ pub(super) struct MeasureGlassesArgs {
     /// Tolerance of the radius of each spot: `0.1%` or `1e-3`
     #[arg(long, default_value = "1e-3", value_name = "TOLERANCE")]
     error: Tolerance,
+
+    /// The evaluations of the merit after which an exchange ends; without it, when nothing gains any more
+    #[arg(long, value_name = "N")]
+    evaluations: Option<usize>,
 }
 
 impl MeasureGlassesArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
-        let compare = |lens: &_, _: &str, stop: &_| {
-            measure_glass_gain(lens, self.seed, self.error.0, stop).transpose()
+        if self.evaluations == Some(0) {
+            return Err(CliError::Input("--evaluations: found 0; expected 1 or more".to_owned()));
+        }
+        let compare = |lens: &_, name: &str, stop: &AtomicBool| {
+            let mut notes = ProgressNotes::new();
+            let mut watch = |progress: GlassProgress| {
+                notes.tell(|| format!("{name}: {}", progress_text(progress)));
+                if stop.load(Ordering::Relaxed) {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            };
+            let way = (self.seed, self.error.0);
+            measure_glass_gain(lens, way, self.evaluations, &mut watch).transpose()
         };
         let rows = self.lenses.map(compare, |file, found| match found {
             Ok(found) => GlassRow { file, found: Some(found), refused: None },
@@ -34,6 +54,16 @@ impl MeasureGlassesArgs {
         })?;
         output.print(&MeasureGlassesReport { machine: Machine::detect(), seed: self.seed, rows })
     }
+}
+
+/// Where a measurement is, in a line.
+fn progress_text(GlassProgress { phase, evaluations, merit, exchanges }: GlassProgress) -> String {
+    let doing = match phase {
+        GlassPhase::Descent => "descent with its own glasses".to_owned(),
+        GlassPhase::Guided => format!("{}, guided", counted(exchanges, "exchange")),
+        GlassPhase::Random => format!("{}, at random", counted(exchanges, "exchange")),
+    };
+    format!("{doing}, {evaluations} evaluations, merit {}", ShortNumber(merit))
 }
 
 #[derive(Serialize)]
@@ -78,12 +108,16 @@ impl Display for MeasureGlassesReport {
             let counts = [found.exchanges, found.evaluations].map(|count| count.to_string());
             let seconds = format!("{:.1}", found.seconds);
             let cells = std::iter::once(file.clone()).chain(merits).chain(counts);
-            table.row(cells.chain([seconds, ShortNumber(found.merit_random).to_string()]));
+            let random = found.merit_random.map_or("-".to_owned(), |m| ShortNumber(m).to_string());
+            table.row(cells.chain([seconds, random]));
         }
         write!(f, "{table}")?;
         for row in &self.rows {
             if let Some(why) = &row.refused {
                 writeln!(f, "{}: {why}", row.file)?;
+            }
+            if row.found.as_ref().is_some_and(|found| !found.finished) {
+                writeln!(f, "{}: ended before exchanges stopped gaining", row.file)?;
             }
         }
         Ok(())

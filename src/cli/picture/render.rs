@@ -7,7 +7,7 @@ use crate::analysis::Estimate;
 use crate::cli::error::CliError;
 use crate::cli::input::LoadedLens;
 use crate::cli::output::print_note;
-use crate::cli::progress::progress_bar;
+use crate::cli::progress::{ProgressNotes, progress_bar};
 use crate::measure::time_ms;
 use crate::picture::{
     DiffractionReport, ErrorMap, ExactRenderer, ExactSettings, GateSubject, GhostLight,
@@ -15,6 +15,7 @@ use crate::picture::{
     QuickPicture, QuickRenderer, Scene, SceneFileError, ToleranceSplit, tile_change,
 };
 use std::ops::ControlFlow;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The tiles on which the quick way is compared with the exact one, and the samples of their pixels.
@@ -259,6 +260,12 @@ impl PictureArgs {
         stop: &AtomicBool,
     ) -> Result<PictureLight, PictureError> {
         let allowed = split.rest(SAMPLING);
+        if split.without(SAMPLING) > self.error.0 {
+            let [taken, asked] = [split.without(SAMPLING), self.error.0].map(|share| 100.0 * share);
+            print_note(format!(
+                "note: {asked:.3} % cannot be reached, effects leave {taken:.3} %; sampling goes on"
+            ));
+        }
         let is_kept = |quick: &PictureLight| {
             self.quick || quick.sampling.value <= allowed || stop.load(Ordering::Relaxed)
         };
@@ -300,8 +307,14 @@ impl PictureArgs {
         let (max_samples, seed) = (self.max_samples, self.seed);
         let settings = ExactSettings { tolerance, max_samples, seed, seconds };
         let bar = progress_bar(STEPS);
+        let notes = Mutex::new(ProgressNotes::in_place_of_bar());
         let watch = |done: f64| {
             bar.set_position((STEPS as f64 * done) as u64);
+            if let Ok(mut notes) = notes.try_lock() {
+                let text =
+                    || format!("{:.0} % of the work that the tolerance may take", 100.0 * done);
+                notes.iter_mut().for_each(|notes| notes.tell(text));
+            }
             if stop.load(Ordering::Relaxed) {
                 ControlFlow::Break(())
             } else {

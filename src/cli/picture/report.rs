@@ -106,10 +106,12 @@ impl PictureReport {
                     f,
                     "diffraction on: contrast changes by up to {change:.2} %, {left:.2} % are left, {cut:.2} % of \
                      the light is cut off, at {points} points: {reason}"
-                )
+                )?;
             }
-            _ => Ok(()),
+            _ => {}
         }
+        let refused = self.diffraction.as_ref().and_then(|found| found.without_aberrations);
+        refused.map_or(Ok(()), |why| writeln!(f, "aberrations are not in that spread: {why}"))
     }
 
     /// The losses, the ghosts and the map of the error.

@@ -123,7 +123,7 @@ impl Region<'_> {
     }
 
     /// The number of nodes along a radius of an order.
-    fn radial_nodes(&self, order: usize) -> usize {
+    pub fn radial_nodes(&self, order: usize) -> usize {
         match self.kind {
             RegionKind::Clear => CLEAR_ORDERS[order.min(CLEAR_ORDERS.len() - 1)],
             // Half of a side of the square.

@@ -130,11 +130,15 @@ fn each_kind_of_error_adds_to_the_term_what_jets_say() {
     }
 }
 
-/// A whole class of tolerances, of lenses with and without cemented elements and aspheres.
+/// A whole class of tolerances, of lenses with and without cemented elements and aspheres, one of them in all its
+/// colours.
 #[test]
 fn a_class_of_tolerances_adds_to_the_term_what_jets_say() {
-    for name in ["double_gauss_rudolph_50", "cooke_triplet_100_f27", "tessar_50_f28"] {
-        let lens = lens(name);
+    for name in ["tessar_50_f28", "cooke_triplet_100_f27", "double_gauss_rudolph_50"] {
+        let mut lens = lens(name);
+        if name != "tessar_50_f28" {
+            lens.wavelengths = vec![lens.wavelengths[lens.primary()]];
+        }
         let expected = growth_by_jets(&lens, &graded(&lens), true);
         assert_close(growth(&lens, GRADED), expected, 1e-6 * expected, name);
     }
