@@ -79,12 +79,20 @@ struct PlannedLens<'a> {
     zoom: usize,
     lens: &'a Lens,
     auto: &'a EffectPlan,
-    model: &'a RayModel,
-    spots: &'a [Result<Spot, AnalysisError>],
+    model: RayModel,
+    spots: Vec<Result<Spot, AnalysisError>>,
 }
 
-fn check(planned_lens: &PlannedLens<'_>, decision: &EffectDecision) {
-    let PlannedLens { name, zoom, lens, auto, model: off, spots } = *planned_lens;
+impl<'a> PlannedLens<'a> {
+    fn new(name: &'a str, zoom: usize, lens: &'a Lens, auto: &'a EffectPlan) -> Self {
+        let model = build_ray_model(lens, zoom, auto).unwrap();
+        Self { name, zoom, lens, auto, spots: exact(&model), model }
+    }
+}
+
+fn check(by_plan: &PlannedLens<'_>, decision: &EffectDecision) {
+    let PlannedLens { name, zoom, lens, auto, model: off, spots } = by_plan;
+    let zoom = *zoom;
     let effect = decision.effect;
     let forced = planned(lens, zoom, TASK, &forced(effect, EffectOverride::On));
     let same = forced.as_conic == auto.as_conic && forced.unclipped == auto.unclipped;
@@ -110,10 +118,7 @@ fn forcing_an_effect_on_changes_no_more_than_the_plan_said() {
     for (name, lens) in library() {
         for zoom in 0..lens.zoom_positions() {
             let auto = planned(&lens, zoom, TASK, &EffectOverrides::default());
-            let model = build_ray_model(&lens, zoom, &auto).unwrap();
-            let spots = exact(&model);
-            let by_plan =
-                PlannedLens { name, zoom, lens: &lens, auto: &auto, model: &model, spots: &spots };
+            let by_plan = PlannedLens::new(name, zoom, &lens, &auto);
             println!("{name} zoom {zoom}");
             for decision in &auto.decisions {
                 println!(
@@ -192,7 +197,7 @@ fn negligible_asphere_terms_are_dropped_and_others_kept() {
     let asphere = auto.decision(Effect::Asphere).unwrap();
     assert_eq!((&auto.as_conic, &asphere.surfaces), (&vec![3], &vec![8]));
     assert!(asphere.residual > 0.0 && asphere.residual < asphere.limit, "{asphere:?}");
-    check("figured double Gauss", 0, &lens, &auto, asphere);
+    check(&PlannedLens::new("figured double Gauss", 0, &lens, &auto), asphere);
     let traced = planned(&lens, 0, TracePurpose::Trace, &EffectOverrides::default());
     assert!(traced.as_conic.len() < 2, "a ray as such is exact");
     let drawn = planned(&lens, 0, TracePurpose::Layout, &EffectOverrides::default());
@@ -209,7 +214,7 @@ fn distant_objects_count_as_infinite() {
         assert_eq!(object.computed, finite, "{object:?}");
         let model = build_ray_model(&lens, 0, &auto).unwrap();
         assert_eq!(model.beam.object == Object::Infinity, !finite);
-        check("double Gauss", 0, &lens, &auto, object);
+        check(&PlannedLens::new("double Gauss", 0, &lens, &auto), object);
     }
     assert_eq!(lens.fields.kind, FieldKind::Angle);
 }
@@ -224,7 +229,7 @@ fn a_tilt_or_a_temperature_that_moves_no_ray_counts_as_none() {
         let poses = auto.decision(Effect::Poses).unwrap();
         assert_eq!(poses.computed, tilted, "{poses:?}");
         assert!(poses.error > 0.0 && poses.residual <= poses.limit, "{poses:?}");
-        check("tilted double Gauss", 0, &lens, &auto, poses);
+        check(&PlannedLens::new("tilted double Gauss", 0, &lens, &auto), poses);
         let off = planned(&lens, 0, TASK, &forced(Effect::Poses, EffectOverride::Off));
         let mut system = lens.resolve(0, 0.5875618).unwrap();
         simplify(&mut system, &off);
@@ -238,7 +243,7 @@ fn a_tilt_or_a_temperature_that_moves_no_ray_counts_as_none() {
         let warmth = auto.decision(Effect::Temperature).unwrap();
         assert_eq!(warmth.computed, matters, "{warmth:?}");
         assert!(warmth.error > 0.0 && warmth.residual <= warmth.limit, "{warmth:?}");
-        check("warm singlet", 0, &lens, &auto, warmth);
+        check(&PlannedLens::new("warm singlet", 0, &lens, &auto), warmth);
         let off = planned(&lens, 0, TASK, &forced(Effect::Temperature, EffectOverride::Off));
         let [off, plain] = [(&lens, off), (&singlet, auto.clone())].map(|(lens, plan)| {
             build_ray_model(lens, 0, &plan).unwrap().channels[0].system.clone()

@@ -1,10 +1,12 @@
 //! The brightest point of a diffraction image in space.
 //!
 //! Where a pupil has aberrations the intensity has many local maxima, among which Newton's method finds the
-//! one that it begins at. So the whole blur, as far as rays tell where it is, is looked at first, in planes
-//! across the chief ray: the field at a grid of points is a product of matrices, since its phase is a sum of
-//! terms in x and in y. The grid has four points to λ/NA, between which the intensity of a peak falls to 0.64 at
-//! most; the method begins at every local maximum of the grid that may be the peak then.
+//! one that it begins at. So the blur is looked at first, in planes across the chief ray. The field at a point is
+//! that of the part of the pupil whose rays come near it, since the phase of the rest turns: only where that part
+//! may make a larger intensity than the best one found before is the field computed. At a grid of points it is a
+//! product of matrices, since its phase is a sum of terms in x and in y. The grid has four points to λ/NA, between
+//! which the intensity of a peak falls to 0.64 at most; the method begins at every local maximum of the grid that
+//! may be the peak then.
 
 use super::Interruption;
 use super::pupil_samples::{NODES_PER_TURN, PupilSamples};
@@ -27,6 +29,15 @@ const CLIMBED: usize = 32;
 const KEPT: usize = 4;
 /// The part of the largest slope from which on a ray tells where the light is focused.
 const LEVER: f64 = 0.3;
+/// The side of a cell by λ/NA. Rays are near a point if they meet the plane in its cell or in one beside it: those of
+/// a third of the pupil that land farther away turn the phase by more than a whole turn over it.
+const CELL: f64 = 2.0;
+/// The share of the light that may land so far away that nodes do not resolve its phase: what it seems to add to a
+/// point of the grid is less than a tenth of its share, and the peak is climbed with nodes of other orders.
+const STRAY: f64 = 0.1;
+/// The largest number of cells of a plane, and of planes.
+const MOST_CELLS: f64 = 1e6;
+const MOST_PLANES: f64 = 1e4;
 /// The products of real numbers that a search may take: a second of one core.
 const MOST_PRODUCTS: f64 = 4e9;
 /// The order of quadrature of few rays.
@@ -46,15 +57,35 @@ pub(super) struct BlurPeaks {
 struct Blur {
     /// The slopes of the chief ray.
     chief: [f64; 2],
-    /// The place of each ray in the plane of the centre, and its slopes against the chief ray.
-    rays: Vec<([f64; 2], [f64; 2])>,
+    rays: Vec<BlurRay>,
     mirrored: bool,
+}
+
+/// A ray of a blur.
+#[derive(Debug)]
+struct BlurRay {
+    /// Its place in the plane of the centre, from the chief ray, in mm.
+    at: [f64; 2],
+    /// Its slopes against the chief ray.
+    slopes: [f64; 2],
+    /// Its share of the amplitude.
+    share: f64,
+}
+
+/// The steps of a search through a blur, in mm: of points across, of planes, and the side of a cell.
+#[derive(Debug, Clone, Copy)]
+struct BlurSteps {
+    across: f64,
+    along: f64,
+    cell: f64,
 }
 
 /// A plane across the chief ray, with a grid of points.
 #[derive(Debug)]
 struct BlurPlane {
     z: f64,
+    /// The distance in mm from a point of the grid within which nearly all rays land.
+    reach: f64,
     /// The places of the columns and rows, from the chief ray.
     places: [Vec<f64>; 2],
 }
@@ -80,13 +111,18 @@ impl BlurPeaks {
         if region.is_sampled() {
             return Ok(Self::default());
         }
-        let traced = TracedLight::new(region, &region.nodes(FEW));
-        let few = traced.on(sphere)?;
-        let blur = Blur::new(&traced, sphere, few.mirrored);
-        let Some(planes) = blur.planes(&few) else { return Ok(Self::default()) };
-        let Some(order) = resolving_order(region, &few, &blur, &planes) else {
+        let few = PupilSamples::of_nodes(region, sphere, &region.nodes(FEW))?;
+        let Some(order) = resolving_order(region, few.turns(0.0)) else {
             return Ok(Self::default());
         };
+        let traced = TracedLight::new(region, &region.nodes(order));
+        let light = traced.on(sphere)?;
+        let found = light.intensity_at(brightest(&light, &[]));
+        let blur = Blur::new(&traced, &light, sphere);
+        let Some(planes) = blur.planes(&light, found.sqrt()) else { return Ok(Self::default()) };
+        let reach = planes.iter().map(|plane| plane.reach).fold(0.0, f64::max);
+        let turns = light.spread() * reach / light.wavelength;
+        let Some(order) = resolving_order(region, turns) else { return Ok(Self::default()) };
         let light = PupilSamples::of_nodes(region, sphere, &region.nodes(order))?;
         let points: f64 = planes.iter().map(BlurPlane::points).sum();
         let parts = if light.mirrored { 2.0 } else { 4.0 };
@@ -105,17 +141,9 @@ impl BlurPeaks {
     }
 }
 
-/// The first order whose nodes resolve the phase of the light at all points of some planes.
-fn resolving_order(
-    region: &Region<'_>,
-    few: &PupilSamples,
-    blur: &Blur,
-    planes: &[BlurPlane],
-) -> Option<usize> {
-    let along = PlaneLight::new(few, blur.chief).depth_of_cosines();
-    let turns =
-        |plane: &BlurPlane| few.turns(plane.reach()) + along * plane.z.abs() / few.wavelength;
-    let least = NODES_PER_TURN * planes.iter().map(turns).fold(0.0, f64::max);
+/// The first order whose nodes resolve a phase of so many turns over a radius of the pupil.
+fn resolving_order(region: &Region<'_>, turns: f64) -> Option<usize> {
+    let least = NODES_PER_TURN * turns;
     (0..region.orders()).find(|order| region.radial_nodes(*order) as f64 >= least)
 }
 
@@ -134,72 +162,148 @@ fn climbed(light: &PupilSamples, mut maxima: Vec<(f64, [f64; 3])>) -> Vec<[f64; 
 }
 
 impl Blur {
-    fn new(traced: &TracedLight, sphere: &ReferenceSphere, mirrored: bool) -> Self {
+    fn new(traced: &TracedLight, light: &PupilSamples, sphere: &ReferenceSphere) -> Self {
         // Light may run against the axis; depth is along the light, as cosines are.
         let slopes = |d: Vec3<f64>| [d.x / d.z.abs(), d.y / d.z.abs()];
         let chief = slopes(sphere.direction);
-        let rays = traced.lines().map(|ray| {
+        let total = light.peak();
+        let lines = traced.ends_of(&light.points);
+        let rays = lines.iter().zip(&light.amplitudes).map(|((ray, _), amplitude)| {
             let off = ray.point - sphere.center;
             let depth = off.z * ray.direction.z.signum();
             let [u, v] = slopes(ray.direction);
-            ([off.x - depth * u, off.y - depth * v], [u - chief[0], v - chief[1]])
+            BlurRay {
+                at: [off.x - depth * u, off.y - depth * v],
+                slopes: [u - chief[0], v - chief[1]],
+                share: amplitude / total,
+            }
         });
-        Self { chief, rays: rays.collect(), mirrored }
+        Self { chief, rays: rays.collect(), mirrored: light.mirrored }
     }
 
     /// The range along the axis in which rays come nearest to the chief ray; `None` if none crosses it.
     fn depth(&self) -> Option<[f64; 2]> {
         let square = |[u, v]: [f64; 2]| u * u + v * v;
-        let most = self.rays.iter().map(|(_, slopes)| square(*slopes)).fold(0.0, f64::max);
-        let outer = self.rays.iter().filter(|(_, slopes)| square(*slopes) > LEVER * LEVER * most);
-        let nearest =
-            outer.map(|(at, slopes)| -(at[0] * slopes[0] + at[1] * slopes[1]) / square(*slopes));
+        let most = self.rays.iter().map(|ray| square(ray.slopes)).fold(0.0, f64::max);
+        let outer = self.rays.iter().filter(|ray| square(ray.slopes) > LEVER * LEVER * most);
+        let nearest = outer.map(|BlurRay { at, slopes, .. }| {
+            -(at[0] * slopes[0] + at[1] * slopes[1]) / square(*slopes)
+        });
         let range = nearest.fold([0.0f64; 2], |[low, high], z| [low.min(z), high.max(z)]);
         range.iter().all(|z| z.is_finite()).then_some(range)
     }
 
-    /// The planes that cover the blur; `None` if it has no extent or they are too many.
-    fn planes(&self, light: &PupilSamples) -> Option<Vec<BlurPlane>> {
+    /// The planes in which at least a share of the amplitude comes near some point; `None` if the blur has no extent
+    /// or they are too many.
+    fn planes(&self, light: &PupilSamples, least: f64) -> Option<Vec<BlurPlane>> {
         let [low, high] = self.depth()?;
-        let step = ALONG * light.wavelength / PlaneLight::new(light, self.chief).depth_of_cosines();
-        let across = ACROSS * light.wavelength / light.spread();
-        let count = (high - low) / step + 2.0;
-        if !(step.is_finite() && across.is_finite() && count * step > 0.0 && count < 1e5) {
+        let unit = light.wavelength / light.spread();
+        let depth = light.wavelength / PlaneLight::new(light, self.chief).depth_of_cosines();
+        let steps = BlurSteps { across: ACROSS * unit, along: ALONG * depth, cell: CELL * unit };
+        let count = (high - low) / steps.along + 2.0;
+        if !(unit.is_finite() && steps.along > 0.0 && count < MOST_PLANES) {
             return None;
         }
-        let plane = |i: usize| self.plane(low + (i as f64 - 0.5) * step, across);
-        (0..=count as usize).map(plane).collect()
+        let mut planes = Vec::new();
+        for i in 0..=count as usize {
+            let z = low + (i as f64 - 0.5) * steps.along;
+            planes.extend(self.plane(z, steps, least)?);
+        }
+        Some(planes)
     }
 
-    /// The plane at a place along the axis, with a grid around the rays there.
-    fn plane(&self, z: f64, step: f64) -> Option<BlurPlane> {
+    /// The distance from a point of a rectangle in a plane within which nearly all rays land.
+    fn reach(&self, z: f64, [[left, right], [low, high]]: [[f64; 2]; 2]) -> f64 {
+        let center = [0.5 * (left + right), 0.5 * (low + high)];
+        let distance = |ray: &BlurRay| {
+            let [x, y] = [0, 1].map(|axis| ray.at[axis] + z * ray.slopes[axis] - center[axis]);
+            (x.hypot(y), ray.share)
+        };
+        let mut all: Vec<(f64, f64)> = self.rays.iter().map(distance).collect();
+        all.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut beyond = 0.0;
+        let within = all.iter().find(|(_, share)| {
+            beyond += share;
+            beyond > STRAY
+        });
+        within.map_or(0.0, |(distance, _)| *distance) + 0.5 * (right - left).hypot(high - low)
+    }
+
+    /// The points of a plane near which at least a share of the amplitude comes, if there are any; `None` if the plane
+    /// has too many cells.
+    fn plane(&self, z: f64, steps: BlurSteps, least: f64) -> Option<Option<BlurPlane>> {
+        let cells = BlurCells::new(self, z, steps.cell)?;
+        let Some(range) = cells.range(least) else { return Some(None) };
         let mut places = [const { Vec::new() }; 2];
         for (axis, places) in places.iter_mut().enumerate() {
-            let at = self.rays.iter().map(|(at, slopes)| at[axis] + z * slopes[axis]);
-            let (low, high) = at.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-                (low.min(v), high.max(v))
-            });
+            let [low, high] = range[axis];
             // Half of the blur is the mirror image of the other half.
-            let low = if self.mirrored && axis == 0 { 0.0 } else { low - 2.0 * step };
-            let count = (high - low) / step + 3.0;
-            if !(count < 1e5) {
-                return None;
-            }
-            places.extend((0..count as usize).map(|i| low + i as f64 * step));
+            let low = if self.mirrored && axis == 0 { low.max(0.0) } else { low };
+            let count = ((high - low) / steps.across).max(0.0) as usize + 2;
+            places.extend((0..count).map(|i| low + i as f64 * steps.across));
         }
-        Some(BlurPlane { z, places })
+        Some(Some(BlurPlane { z, reach: self.reach(z, range), places }))
+    }
+}
+
+/// The shares of the amplitude of a plane by square cells.
+struct BlurCells {
+    /// The corner of the first cell, and the side of each.
+    corner: [f64; 2],
+    side: f64,
+    shares: DMatrix<f64>,
+}
+
+impl BlurCells {
+    /// `None` for too many cells.
+    fn new(blur: &Blur, z: f64, side: f64) -> Option<Self> {
+        let place = |ray: &BlurRay| [0, 1].map(|axis| ray.at[axis] + z * ray.slopes[axis]);
+        let mirrors: &[f64] = if blur.mirrored { &[1.0, -1.0] } else { &[1.0] };
+        let each = |ray| mirrors.iter().map(move |sign| (place(ray), *sign));
+        let all = || blur.rays.iter().flat_map(each).map(|([x, y], sign)| [sign * x, y]);
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for at in all() {
+            low = [0, 1].map(|axis| low[axis].min(at[axis]));
+            high = [0, 1].map(|axis| high[axis].max(at[axis]));
+        }
+        let counts = [0, 1].map(|axis| (high[axis] - low[axis]) / side + 1.0);
+        if !(counts[0] * counts[1] < MOST_CELLS) {
+            return None;
+        }
+        let mut shares = DMatrix::zeros(counts[0] as usize + 1, counts[1] as usize + 1);
+        let share = blur.rays.iter().flat_map(|ray| mirrors.iter().map(|_| ray.share));
+        for (at, share) in all().zip(share) {
+            let cell = [0, 1].map(|axis| ((at[axis] - low[axis]) / side) as usize);
+            shares[(cell[0], cell[1])] += share / mirrors.len() as f64;
+        }
+        Some(Self { corner: low, side, shares })
+    }
+
+    /// The smallest rectangle around the cells that have at least a share together with those beside them.
+    fn range(&self, least: f64) -> Option<[[f64; 2]; 2]> {
+        let (columns, rows) = self.shares.shape();
+        let near = |n: usize, end: usize| n.saturating_sub(1)..(n + 2).min(end);
+        let around = |i: usize, k: usize| -> f64 {
+            near(i, columns)
+                .flat_map(|i| near(k, rows).map(move |k| (i, k)))
+                .map(|at| self.shares[at])
+                .sum()
+        };
+        let (mut low, mut high) = ([usize::MAX; 2], [0; 2]);
+        for cell in (0..columns).flat_map(|i| (0..rows).map(move |k| [i, k])) {
+            if around(cell[0], cell[1]) >= least {
+                low = [0, 1].map(|axis| low[axis].min(cell[axis]));
+                high = [0, 1].map(|axis| high[axis].max(cell[axis] + 1));
+            }
+        }
+        let place = |axis: usize, n: usize| self.corner[axis] + self.side * n as f64;
+        (high[0] > 0).then(|| [0, 1].map(|axis| [place(axis, low[axis]), place(axis, high[axis])]))
     }
 }
 
 impl BlurPlane {
     fn points(&self) -> f64 {
         self.places[0].len() as f64 * self.places[1].len() as f64
-    }
-
-    /// The largest distance of its points from the chief ray.
-    fn reach(&self) -> f64 {
-        let most = |places: &[f64]| places.iter().fold(0.0f64, |most, v| most.max(v.abs()));
-        most(&self.places[0]).hypot(most(&self.places[1]))
     }
 }
 

@@ -87,12 +87,11 @@ impl PupilSamples {
 
     /// The radius of the pupil about its middle, in direction cosines.
     pub(super) fn spread(&self) -> f64 {
-        let widest = self.cosines.iter().map(|[a, b]| a.hypot(*b)).fold(0.0, f64::max);
-        let middle = self.cosines.iter().fold([0.0; 2], |s, c| [s[0] + c[0], s[1] + c[1]]);
-        let middle = middle.map(|sum| sum / self.cosines.len() as f64);
-        let reach = |c: &[f64; 2]| (c[0] - middle[0]).hypot(c[1] - middle[1]);
-        if self.mirrored { widest } else { 0.0 }
-            .max(self.cosines.iter().map(reach).fold(0.0, f64::max))
+        let sum = self.cosines.iter().fold([0.0; 2], |s, c| [s[0] + c[0], s[1] + c[1]]);
+        let [x, y] = sum.map(|sum| sum / self.cosines.len() as f64);
+        // The middle of both halves lies on the line of symmetry.
+        let x = if self.mirrored { 0.0 } else { x };
+        self.cosines.iter().map(|[a, b]| (a - x).hypot(b - y)).fold(0.0, f64::max)
     }
 
     /// The light of a pupil at some nodes.
