@@ -1,6 +1,6 @@
 //! What the command line says: notes, tables with heads, refusals that name the right file and number.
 
-use super::cli::{Scratch, aplanat, done, refused};
+use super::cli::{Scratch, aplanat, done, done_json, refused};
 use serde_json::json;
 
 const GAUSS: &str = "lenses/double_gauss_rudolph_50.json";
@@ -148,4 +148,16 @@ fn tables_have_heads_and_no_rounding_noise() {
         let is_head = |line: &str| heads.iter().all(|head| line.contains(head));
         assert!(text.lines().skip(1).any(is_head), "{text}");
     }
+}
+
+/// Encircled energy says as contrast does that it did not reach its tolerance.
+#[test]
+fn encircled_energy_says_whether_its_tolerance_was_reached() {
+    let asked = |error: &'static str| {
+        ["analyze", ACHROMAT, "encircled-energy", "--field=0", "--radii=0.002", "--error", error]
+    };
+    let text = done(&asked("1e-15"), "");
+    assert!(text.contains("tolerance not reached: limited by the number of rays"), "{text}");
+    let found = &done_json(&asked("1%"), "")["fields"][0];
+    assert!(found["reached"] == true && found["limit"].is_null(), "{found}");
 }

@@ -1,6 +1,6 @@
 //! The modulation transfer function: against frequency, and through focus.
 
-use super::{AnalysisRun, AtField, SelectedField, TextLines};
+use super::{AnalysisRun, AtField, SelectedField, TextLines, not_reached_text};
 use crate::analysis::{AnalysisError, diffraction_mtf};
 use crate::analysis::{
     DiffractionGate, MtfCurve, MtfPoint, diffraction_gate, geometric_mtf,
@@ -99,8 +99,7 @@ impl TextLines for MtfJson {
             match curve {
                 CurveJson::Refused { refused } => lines.push(format!("{name}: {refused}")),
                 CurveJson::Curve { milliseconds, curve } => {
-                    let limit = |limit| format!(", tolerance not reached: {limit}");
-                    let reached = curve.limit.map_or_else(String::new, limit);
+                    let reached = not_reached_text(curve.limit);
                     let rays = counted(curve.rays, "ray");
                     lines.push(format!("{name}: {rays}, {milliseconds:.3} ms{reached}"));
                     lines.push(column_heads("cycles/mm"));

@@ -26,7 +26,7 @@ use super::failures::Failures;
 use super::input::{LensFile, LoadedLens, Tolerance};
 use super::output::{Output, ShortNumber, counted, without_rounding};
 use super::output_paths::OutputPaths;
-use crate::analysis::{AnalysisError, Coating, Estimate};
+use crate::analysis::{AnalysisError, Coating, ContrastLimit, Estimate};
 use crate::effects::{self, Effect, EffectPlan, TracePurpose};
 use crate::files;
 use crate::lens::{FieldKind, FieldPoint, SurfaceNumber};
@@ -50,7 +50,8 @@ pub(super) struct AnalyzeArgs {
     /// The analysis
     what: AnalysisKind,
 
-    /// Relative tolerance: `0.1%` or `1e-3`
+    /// Tolerance: `0.1%` or `1e-3`; relative for radii, the RMS wavefront and `illumination`; absolute for
+    /// contrast, for intensities over the perfect peak, for shares of the light and for coefficients in wavelengths
     #[arg(long, default_value = "0.1%", value_name = "TOLERANCE")]
     error: Tolerance,
 
@@ -651,6 +652,11 @@ fn estimate_text(name: &str, estimate: &Estimate) -> String {
     let ms = milliseconds.map(|ms| format!(", {ms:.3} ms")).unwrap_or_default();
     let (value, rays) = (ShortNumber(without_rounding(value, error)), counted(rays, "ray"));
     format!("{name:<22} {value:>13} ± {error:.1e}   {rays}{ms}")
+}
+
+/// What keeps errors above the tolerance, as it follows the cost of numbers; empty if it was reached.
+fn not_reached_text(limit: Option<ContrastLimit>) -> String {
+    limit.map_or_else(String::new, |limit| format!(", tolerance not reached: {limit}"))
 }
 
 /// Computes a result and passes it with its milliseconds to `note`.
