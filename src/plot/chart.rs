@@ -11,6 +11,8 @@ const MOST_TICKS: f64 = 8.0;
 const END_TOLERANCE: f64 = 1e-6;
 /// The distance of tick labels from an axis, in pixels.
 const PADDING: f64 = 10.0;
+/// The length of a tick outside a frame, in pixels.
+const TICK: f64 = 6.0;
 /// Half the height of a letter, in pixels: ticks and samples are centred on their names.
 const HALF_LETTER: f64 = 7.0;
 
@@ -33,6 +35,13 @@ impl Axis {
         let step = round_step(width / TICKS);
         let (low, high) = ((low / step).floor() * step, (high / step).ceil() * step);
         let high = if high > low { high } else { low + step };
+        Self { name: name.to_owned(), low, high, step, logarithmic: false }
+    }
+
+    /// A linear axis with exactly these ends, at which there need not be ticks.
+    pub fn spanning(name: &str, low: f64, high: f64) -> Self {
+        let high = if high > low { high } else { low + 1.0 };
+        let step = round_step((high - low) / TICKS);
         Self { name: name.to_owned(), low, high, step, logarithmic: false }
     }
 
@@ -162,6 +171,25 @@ impl Chart {
         self.draw_frame(canvas);
         let middle = 0.5 * (self.left + self.right);
         canvas.text([middle, self.top - 48.0], title, BLACK, TextAlign::Middle);
+        canvas.text([middle, self.bottom + 46.0], &self.x.name, BLACK, TextAlign::Middle);
+        let above = [self.left - PADDING, self.top - 24.0];
+        canvas.text(above, &self.y.name, BLACK, TextAlign::Left);
+    }
+
+    /// Draws a frame with ticks outside, their labels and the names of the axes around a picture.
+    pub fn draw_ticks(&self, canvas: &mut Canvas) {
+        self.draw_frame(canvas);
+        for (share, label) in self.x.ticks() {
+            let x = self.left + (self.right - self.left) * share;
+            canvas.line([x, self.bottom], [x, self.bottom + TICK], BLACK);
+            canvas.text([x, self.bottom + PADDING], &label, BLACK, TextAlign::Middle);
+        }
+        for (share, label) in self.y.ticks() {
+            let y = self.bottom - (self.bottom - self.top) * share;
+            canvas.line([self.left - TICK, y], [self.left, y], BLACK);
+            canvas.text([self.left - PADDING, y - HALF_LETTER], &label, BLACK, TextAlign::Right);
+        }
+        let middle = 0.5 * (self.left + self.right);
         canvas.text([middle, self.bottom + 46.0], &self.x.name, BLACK, TextAlign::Middle);
         let above = [self.left - PADDING, self.top - 24.0];
         canvas.text(above, &self.y.name, BLACK, TextAlign::Left);

@@ -37,10 +37,11 @@ pub fn tolerance_table(
     further: &FurtherColumns,
     order: FocusTreatment,
 ) -> Result<String, ToleranceError> {
-    let mut text = "kind,first_surface,last_surface,unit,half_range (unit),sigma (unit),distribution,\
+    let mut text =
+        "kind,first_surface,last_surface,unit,half_range (unit),sigma (unit),distribution,\
                     fixed_first (mm^2/unit),fixed_second (mm^2/unit^2),fixed_share,\
                     refocused_first (mm^2/unit),refocused_second (mm^2/unit^2),refocused_share"
-        .to_owned();
+            .to_owned();
     text.push_str(&further.heads);
     text.push_str("\r\n");
     for (i, [fixed, refocused]) in sorted_shares(sheet, analysis, order)? {

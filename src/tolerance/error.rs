@@ -81,7 +81,9 @@ pub enum ToleranceError {
         what: &'static str,
     },
     /// Tolerances are asked for with which lenses are better than the one without errors.
-    #[error("found {found} mm; expected more than {nominal:.6} mm, the rms of the lens without errors")]
+    #[error(
+        "found {found} mm; expected more than {nominal:.6} mm, the rms of the lens without errors"
+    )]
     BelowNominal {
         /// The rms spot radius that is asked for in mm.
         found: f64,

@@ -8,7 +8,7 @@ use crate::analysis::{
 use crate::cli::output::{ShortNumber, counted, without_rounding};
 use crate::measure::time_ms;
 use crate::plot::{ChartCurve, CurveChart};
-use crate::pupil::Accuracy;
+use crate::pupil::{Accuracy, PupilPattern, pattern_points};
 use serde::Serialize;
 
 /// The diffraction image of a field.
@@ -77,16 +77,45 @@ pub(super) fn point_spreads(run: &AnalysisRun) -> Vec<AtField<PointSpreadJson>> 
     run.fields.iter().map(at).collect()
 }
 
-/// The points of a drawn profile on each side of its centre, and the distance that they reach in λF.
-const DRAWN: (i32, f64) = (40, 5.0);
+/// The points of a drawn profile for each λF, and their least and largest number on each side of its centre.
+const DRAWN: f64 = 8.0;
+const DRAWN_POINTS: [f64; 2] = [40.0, 200.0];
+/// The least distance that a drawn profile reaches, in λF: the circle holds 96 % of a perfect image.
+const LEAST_REACH: f64 = 5.0;
+/// The share of the rays within the distance that a drawn profile reaches, and the rays over the pupil.
+const DRAWN_SHARE: f64 = 0.99;
+const SPREAD_SIDE: usize = 32;
 /// The rays of the drawn profiles.
 const DRAWN_RAYS: usize = 100_000;
+
+/// The radius in mm of the circle about the image point of the chief ray that holds 99 % of the rays; `None`
+/// without light.
+fn circle_of_rays(run: &AnalysisRun, field: &SelectedField) -> Option<f64> {
+    let (model, primary) = (&run.model, run.model.primary);
+    let launch = model.launch(field.traced, primary).ok()?;
+    let landing = |point: [f64; 2]| {
+        let traced = model.channels[primary].tracer.trace(launch.ray(point)?);
+        traced.fate.is_imaged().then_some(traced.ray.point)
+    };
+    let chief = landing([0.0; 2])?;
+    let grid = pattern_points(PupilPattern::Square(SPREAD_SIDE));
+    let landed = grid.into_iter().filter_map(landing);
+    let mut distances: Vec<f64> =
+        landed.map(|point| (point.x - chief.x).hypot(point.y - chief.y)).collect();
+    distances.sort_by(f64::total_cmp);
+    let inside = (DRAWN_SHARE * distances.len() as f64).ceil() as usize;
+    distances.get(inside.saturating_sub(1)).copied().filter(|radius| radius.is_finite())
+}
 
 /// The intensities along x and along y through the image point of the chief ray, over the distance in
 /// micrometres.
 fn profiles(run: &AnalysisRun, field: &SelectedField) -> [Vec<[f64; 2]>; 2] {
-    let (count, reach) = DRAWN;
-    let place = |i: i32| f64::from(i) / f64::from(count) * reach * unit(run);
+    let reach = run
+        .reach
+        .unwrap_or_else(|| circle_of_rays(run, field).unwrap_or(0.0).max(LEAST_REACH * unit(run)));
+    let [least, most] = DRAWN_POINTS;
+    let count = (DRAWN * reach / unit(run)).ceil().clamp(least, most) as i32;
+    let place = |i: i32| f64::from(i) / f64::from(count) * reach;
     let along_x = (-count..=count).map(|i| [place(i), 0.0]);
     let along_y = (-count..=count).map(|i| [0.0, place(i)]);
     let points: Vec<[f64; 2]> = along_x.chain(along_y).collect();

@@ -44,7 +44,16 @@ pub(super) fn compensator_rows(analysis: &ToleranceAnalysis) -> Vec<CompensatorR
 
 /// The compensators as text: angles in minutes of arc; of the real lenses, or by the form without any.
 pub(super) fn compensator_table(rows: &[CompensatorRow]) -> TextTable {
-    let head = ["compensator", "surfaces", "travel", "as designed", "mean", "standard deviation", "largest", "at stop"];
+    let head = [
+        "compensator",
+        "surfaces",
+        "travel",
+        "as designed",
+        "mean",
+        "standard deviation",
+        "largest",
+        "at stop",
+    ];
     let mut table = TextTable::new(&head);
     for row in rows {
         let (factor, unit) =

@@ -151,8 +151,7 @@ impl ToleranceArgs {
         let worst = self.worst(&opened, &scene, &sheet, &analysis.real).map_err(refuse)?;
         if let Some(path) = &self.csv {
             let columns = further.columns(&sheet);
-            let table =
-                tolerance_table(&sheet, &analysis, &columns, self.sort).map_err(refuse)?;
+            let table = tolerance_table(&sheet, &analysis, &columns, self.sort).map_err(refuse)?;
             failures.note(files::write_atomic(path, table.as_bytes()));
         }
         if let Some(path) = &self.plot {

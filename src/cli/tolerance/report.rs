@@ -8,8 +8,8 @@ use super::power::PowerUnits;
 use crate::cli::output::ShortNumber;
 use crate::lens::{Lens, PerturbationKind, ToleranceSheet};
 use crate::tolerance::{
-    AsBuiltSpot, Derivatives, FocusTreatment, MadeLens, NominalLens, PupilMotion, StoppedLenses, ToleranceAnalysis,
-    ToleranceError, ToleranceScene,
+    AsBuiltSpot, Derivatives, FocusTreatment, MadeLens, NominalLens, PupilMotion, StoppedLenses,
+    ToleranceAnalysis, ToleranceError, ToleranceScene,
 };
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -148,25 +148,25 @@ fn rows(
 ) -> Vec<SensitivityRow> {
     let both = sheet.errors.iter().zip(shares.iter().copied()).enumerate();
     both.map(|(i, (tolerance, [fixed, refocused]))| {
-            let [by_fixed, by_adjusted] = analysis.forms.each_ref().map(|form| Derivatives {
-                value: form.nominal,
-                first: form.first[i],
-                second: form.second.of(i, i),
-            });
-            let sigma = tolerance.deviation();
-            SensitivityRow {
-                kind: tolerance.error.kind,
-                first: tolerance.error.first,
-                last: tolerance.error.last,
-                half_range: tolerance.half_range,
-                power: PowerUnits::new(tolerance, lens),
-                sigma,
-                fixed: ShareOfGrowth { by: by_fixed, share: fixed },
-                refocused: ShareOfGrowth { by: by_adjusted, share: refocused },
-                further: further.row(i),
-            }
-        })
-        .collect()
+        let [by_fixed, by_adjusted] = analysis.forms.each_ref().map(|form| Derivatives {
+            value: form.nominal,
+            first: form.first[i],
+            second: form.second.of(i, i),
+        });
+        let sigma = tolerance.deviation();
+        SensitivityRow {
+            kind: tolerance.error.kind,
+            first: tolerance.error.first,
+            last: tolerance.error.last,
+            half_range: tolerance.half_range,
+            power: PowerUnits::new(tolerance, lens),
+            sigma,
+            fixed: ShareOfGrowth { by: by_fixed, share: fixed },
+            refocused: ShareOfGrowth { by: by_adjusted, share: refocused },
+            further: further.row(i),
+        }
+    })
+    .collect()
 }
 
 fn warnings(analysis: &ToleranceAnalysis) -> Vec<String> {

@@ -61,7 +61,8 @@ impl ToleranceReport {
             };
             let shares = [rest(|row| row.fixed.share), rest(|row| row.refocused.share)];
             let [fixed, refocused] = shares.map(percent);
-            let own = [format!("{more} more (--all)"), String::new(), String::new(), fixed, refocused];
+            let own =
+                [format!("{more} more (--all)"), String::new(), String::new(), fixed, refocused];
             let none = self.further.heads().into_iter().map(|_| String::new());
             table.row(own.into_iter().chain(none));
         }

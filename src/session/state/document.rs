@@ -287,8 +287,8 @@ impl Session {
         let (sheet, analysis) = (&made.sheet, &made.analysis);
         if kind == PaperKind::ToleranceTable {
             let (further, order) = (FurtherColumns::default(), FocusTreatment::Refocused);
-            let table = tolerance_table(sheet, analysis, &further, order)
-                .map_err(|why| why.to_string())?;
+            let table =
+                tolerance_table(sheet, analysis, &further, order).map_err(|why| why.to_string())?;
             return Ok(table.into_bytes());
         }
         let charts = tolerance_sheet(&self.lens.name, sheet, analysis);
