@@ -272,6 +272,15 @@ mod tests {
     }
 
     #[test]
+    fn an_axis_that_spans_a_picture_has_its_ends_and_round_ticks() {
+        let axis = Axis::spanning("mm", -1.1, 1.1);
+        assert_eq!((axis.low, axis.high), (-1.1, 1.1));
+        let ticks: Vec<(f64, String)> = axis.ticks().collect();
+        assert!(ticks.len() >= 3 && ticks.iter().all(|(share, _)| (0.0..=1.0).contains(share)));
+        assert_eq!(ticks[ticks.len() / 2].1, "0");
+    }
+
+    #[test]
     fn an_axis_is_widened_on_both_sides_alike() {
         let axis = Axis::linear("mm", [2.0, 12.0]);
         let (low, high) = (axis.low, axis.high);

@@ -331,3 +331,26 @@ fn write_error(error: &FieldDifference, f: &mut fmt::Formatter<'_>) -> fmt::Resu
     let part = format!("{relative_to_contrast:.4} of the difference");
     writeln!(f, "which is {part} between the exact field and the start")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_loss_has_the_unit_of_its_views() {
+        let unit = |name: &str| {
+            let task = grin_design::find_builtin(name).unwrap().task().unwrap();
+            loss_unit(&task.views)
+        };
+        assert_eq!(unit("luneburg"), " mm^2");
+        assert_eq!(unit("display"), ", mean squared difference of images");
+    }
+
+    #[test]
+    fn a_search_that_ended_by_itself_was_not_stopped() {
+        let words =
+            [GrinEnd::Converged, GrinEnd::IterationLimit, GrinEnd::TimeLimit].map(GrinEnd::words);
+        assert_eq!(words, ["", ", iteration limit reached", ", time limit reached"]);
+        assert_eq!(GrinEnd::Stopped.words(), ", stopped");
+    }
+}

@@ -218,7 +218,7 @@ fn the_command_draws_and_groups() {
     for words in ["<svg", "thickness 1", "yield", "share of the growth"] {
         assert!(drawing.contains(words), "{words}");
     }
-    let wrong = ["expected `.png`, `.svg` or `.pdf`"];
+    let wrong = ["expected `.png` or `.svg` or `.pdf`"];
     refused(2, &[&few[..], &["--plot", "drawn.jpg"]].concat(), "", &wrong);
     refused(2, &[&few[..], &["--mtf=0"]].concat(), "", &["--mtf", "cycles/mm"]);
 }
