@@ -154,7 +154,7 @@ impl LoadedLens {
         )))
     }
 
-    /// What an error of a lens that is seen at one field begins with: the option `--field` if the lens has no
+    /// The beginning of an error of a lens that is seen at one field: the option `--field` if the lens has no
     /// such field of its own, else the file.
     pub(super) fn blame_field(&self, field: Option<f64>, zoom: usize) -> String {
         let is_own =

@@ -146,7 +146,7 @@ impl PerturbationKind {
 pub struct TableUnit {
     /// Its name in a file, `1` for a number without one.
     pub name: &'static str,
-    /// How many of it are one unit of the computation, which is in mm, radians and shares.
+    /// The number of them in one unit of the computation, which is in mm, radians and shares.
     pub factor: f64,
 }
 

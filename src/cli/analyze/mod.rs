@@ -432,7 +432,7 @@ const MOST_FREQUENCIES: usize = 1000;
 struct AnalysisRun {
     what: AnalysisKind,
     opened: LoadedLens,
-    /// What an error of the lens at these fields begins with: its file, or the option that names a field.
+    /// The beginning of an error of the lens at these fields: its file, or the option that names a field.
     blamed: String,
     plan: EffectPlan,
     model: RayModel,
@@ -678,7 +678,7 @@ fn estimate_text(name: &str, estimate: &Estimate) -> String {
     format!("{name:<22} {value:>13} ± {error:.1e}   {rays}{ms}")
 }
 
-/// What keeps errors above the tolerance, as it follows the cost of numbers; empty if it was reached.
+/// The cause of errors above the tolerance, as it follows the cost of numbers; empty if it was reached.
 fn not_reached_text(limit: Option<ContrastLimit>) -> String {
     limit.map_or_else(String::new, |limit| format!(", tolerance not reached: {limit}"))
 }

@@ -20,7 +20,7 @@ pub(super) struct PointSpreadJson {
     center: [f64; 2],
     reference: ReferenceForm,
     reached: bool,
-    /// What keeps errors above the tolerance; `None` if it was reached.
+    /// The cause of errors above the tolerance; `None` if it was reached.
     limit: Option<ContrastLimit>,
     points: Vec<IntensityJson>,
     /// The rounding error of a length, in mm.
@@ -217,7 +217,7 @@ const DARK: f64 = 1e-6;
 #[derive(Serialize)]
 pub(super) struct EncircledJson {
     reached: bool,
-    /// What keeps errors above the tolerance; `None` if it was reached.
+    /// The cause of errors above the tolerance; `None` if it was reached.
     limit: Option<ContrastLimit>,
     circles: Vec<CircleJson>,
 }

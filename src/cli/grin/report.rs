@@ -22,7 +22,7 @@ pub(super) struct GrinCostSummary {
     pub(super) end: GrinEnd,
 }
 
-/// What ended a search.
+/// The reason for which a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum GrinEnd {

@@ -362,7 +362,7 @@ impl PictureArgs {
     }
 }
 
-/// Why a picture with a coating has no ghosts, which are the last that is added to it.
+/// The reason for which a picture with a coating has no ghosts, which are the last that is added to it.
 const NO_GHOSTS: &str = "not computed, since the picture was stopped";
 
 /// A lens focused for a picture, with its sensor.
