@@ -224,9 +224,9 @@ impl PictureArgs {
     }
 
     /// The error of a picture, which begins with the option at fault, else with the file of the lens.
-    fn refuse(&self, opened: &LoadedLens, error: PictureError) -> CliError {
+    fn refuse(&self, opened: &LoadedLens, error: &PictureError) -> CliError {
         let asked = |distance: f64| self.focus == Some(distance);
-        let blamed = match &error {
+        let blamed = match error {
             PictureError::NotImaged { distance } if asked(*distance) => "--focus",
             PictureError::NotFocused { distance } if asked(*distance) => "--focus",
             _ => &opened.file,

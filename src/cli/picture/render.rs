@@ -102,7 +102,7 @@ impl PictureArgs {
         source: &SceneSource,
         stop: &AtomicBool,
     ) -> Result<(RenderedPicture, CameraShot), CliError> {
-        let refuse = |error: PictureError| self.refuse(opened, error);
+        let refuse = |error: PictureError| self.refuse(opened, &error);
         let mut split = self.split();
         let shot = self.shot(opened, source, WAVELENGTH_COUNTS[USUAL]).map_err(refuse)?;
         let scene = self.scene(source, &shot).map_err(|error| match error {

@@ -169,7 +169,7 @@ impl SensorArgs {
         put(&mut model.gain, self.gain);
         put(&mut model.black_level, self.black_level);
         model.bits = self.sensor_bits.unwrap_or(model.bits);
-        model.check().map_err(wrong_number)?;
+        model.check().map_err(|error| wrong_number(&error))?;
         if before != *model {
             sensor.source = format!("{}; changed by options", sensor.source);
         }
@@ -224,11 +224,11 @@ impl PictureArgs {
 }
 
 /// The error of a number of a sensor, which begins with its option.
-fn wrong_number(error: PictureError) -> CliError {
+fn wrong_number(error: &PictureError) -> CliError {
     let PictureError::Size { what, found, expected } = error else {
         return CliError::Input(format!("--sensor: {error}"));
     };
-    let option = match what {
+    let option = match *what {
         "the number of bits" => "sensor-bits".to_owned(),
         name => name.trim_start_matches("the ").replace(' ', "-"),
     };

@@ -37,6 +37,7 @@ fn parse_sample_count(text: &str) -> Result<usize, &'static str> {
 /// Shows what manufacturing errors do to a lens: sensitivities, expected spot, quantiles, yield
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/tolerance.txt"))]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(super) struct ToleranceArgs {
     #[command(flatten)]
     lens: LensFile,
