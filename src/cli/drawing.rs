@@ -92,8 +92,15 @@ impl DrawingArgs {
         } else {
             self.drawn(&opened.lens)
         };
-        let (bytes, report) =
-            made.map_err(|error| CliError::Input(format!("{}: {error}", opened.file)))?;
+        let (bytes, report) = made.map_err(|error| {
+            let file = &opened.file;
+            CliError::Input(match error {
+                ReportError::NoElement { found, expected } => {
+                    format!("--element: no element {found} in {file}; expected {expected}")
+                }
+                error => format!("{file}: {error}"),
+            })
+        })?;
         write_atomic(&self.out, &bytes)?;
         output.print(&report)
     }

@@ -94,7 +94,8 @@ impl GradientArgs {
         let choices = self.effects.choices(&[PUPIL_OF_THE_STOP])?;
         let opened = self.lens.open()?;
         opened.check_zoom(self.zoom)?;
-        let refuse = |source| CliError::RayModel { file: opened.file.clone(), source };
+        let blamed = opened.blame_field(self.field, self.zoom);
+        let refuse = |source| CliError::RayModel { file: blamed.clone(), source };
         let mut lens = self.selected_lens(&opened)?;
         if let Some(why) = lens.stop().and_then(|stop| lens.surfaces[stop].stop_fault()) {
             return Err(CliError::Input(format!("{}: {why}", opened.file)));
@@ -106,7 +107,7 @@ impl GradientArgs {
         lens.surfaces[model.stop()].semi_diameter = Some(model.stop_radius());
         let (found, ms) = time_ms(|| self.differentiate(&model));
         let found = found.map_err(|cause| {
-            let text = format!("{}: {cause}", opened.file);
+            let text = format!("{blamed}: {cause}");
             match cause {
                 DerivativeError::Dark(..)
                 | DerivativeError::Launch(_)

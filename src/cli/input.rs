@@ -146,10 +146,26 @@ impl LoadedLens {
             return Ok(());
         }
         let last = count - 1;
+        let expected =
+            if last == 0 { "0, the only one".to_owned() } else { format!("0 to {last}") };
         Err(CliError::Input(format!(
-            "{}: no zoom position {zoom}; expected 0 to {last}",
+            "--zoom: no zoom position {zoom} in {}; expected {expected}",
             self.file
         )))
+    }
+
+    /// The beginning of an error of a lens that is seen at one field: the option `--field` if the lens has no
+    /// such field of its own, else the file.
+    pub(super) fn blame_field(&self, field: Option<f64>, zoom: usize) -> String {
+        let is_own =
+            |y: f64| self.lens.fields_at(zoom).values.iter().any(|f| f.x == 0.0 && f.y == y);
+        match field.filter(|y| !is_own(*y)) {
+            Some(y) => format!(
+                "--field: found {y}; expected a field whose light gets through {}",
+                self.file
+            ),
+            None => self.file.clone(),
+        }
     }
 }
 

@@ -46,10 +46,13 @@ mod trace;
 mod window;
 
 use crate::files;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use error::CliError;
 use output::{Output, print_note};
 use std::any::TypeId;
+use std::error::Error;
+use std::num::{IntErrorKind, ParseIntError};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -162,7 +165,8 @@ pub fn run_collecting(arguments: &[String]) -> CommandOutcome {
     progress::leave_signals_to_host();
     let words = std::iter::once("aplanat").chain(arguments.iter().map(String::as_str));
     let matches = with_numbers(CliArgs::command()).try_get_matches_from(words);
-    let parsed = matches.and_then(|matches| CliArgs::from_arg_matches(&matches));
+    let parsed =
+        matches.map_err(in_plain_words).and_then(|matches| CliArgs::from_arg_matches(&matches));
     let output = Output::collecting();
     let (error, status) = match parsed.map(|arguments| arguments.run_with(&output)) {
         Ok(Ok(())) => (None, 0),
@@ -181,7 +185,8 @@ pub fn stop_collecting() {
 impl CliArgs {
     /// The arguments of the process.
     fn read() -> Result<Self, clap::Error> {
-        Self::from_arg_matches(&with_numbers(Self::command()).try_get_matches()?)
+        let matches = with_numbers(Self::command()).try_get_matches();
+        Self::from_arg_matches(&matches.map_err(in_plain_words)?)
     }
 
     fn run(&self) -> Result<(), CliError> {
@@ -212,6 +217,23 @@ fn with_number(option: Arg) -> Arg {
     let is_length = option.get_value_parser().type_id() == TypeId::of::<f64>();
     let option = option.allow_negative_numbers(true);
     if is_length { option.value_parser(parse_number) } else { option }
+}
+
+/// A wrong whole number with what was expected in place of it; any other error as it is.
+fn in_plain_words(usage: clap::Error) -> clap::Error {
+    let wrong = usage.source().and_then(|source| source.downcast_ref::<ParseIntError>());
+    let Some(kind) = wrong.map(ParseIntError::kind) else { return usage };
+    let expected = match kind {
+        IntErrorKind::PosOverflow => "expected a smaller whole number",
+        _ => "expected a whole number, 0 or more",
+    };
+    let word = |kind| match usage.get(kind) {
+        Some(ContextValue::String(word)) => word.clone(),
+        _ => String::new(),
+    };
+    let (option, found) = (word(ContextKind::InvalidArg), word(ContextKind::InvalidValue));
+    let text = format!("invalid value '{found}' for '{option}': {expected}\n");
+    clap::Error::raw(ErrorKind::ValueValidation, text)
 }
 
 fn parse_number(text: &str) -> Result<f64, &'static str> {

@@ -6,7 +6,7 @@ use crate::measure::{Integral, SearchContender};
 use crate::optimize::DescentMethod;
 use crate::optimize::pareto::Scalarization;
 use crate::search::SearchMethod;
-use crate::tolerance::ToleranceGrade;
+use crate::tolerance::{FocusTreatment, ToleranceGrade};
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
 
@@ -30,6 +30,19 @@ impl ValueEnum for VignettingChoice {
             Self::Factors => "Surfaces are as wide as the rays at the edges of the factors need",
         };
         Some(value(self.name(), help))
+    }
+}
+
+impl ValueEnum for FocusTreatment {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::Refocused, Self::Fixed]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(match self {
+            Self::Refocused => value("refocused", "At the best focus of each lens"),
+            Self::Fixed => value("fixed", "At the image plane of the lens as designed"),
+        })
     }
 }
 

@@ -82,7 +82,15 @@ impl ParetoArgs {
         let opened = self.lens.open()?;
         let lens = design.working_lens(&opened.lens);
         let stop = stop_flag();
-        let refuse = |cause: ParetoError| CliError::Input(format!("{}: {cause}", opened.file));
+        let refuse = |cause: ParetoError| {
+            let blamed = match &cause {
+                ParetoError::Settings { what: "the number of points", .. } => "--points",
+                ParetoError::Settings { what: "the light", .. } => "--light",
+                ParetoError::Settings { what: "the number of steps", .. } => "--steps",
+                _ => &opened.file,
+            };
+            CliError::Input(format!("{blamed}: {cause}"))
+        };
         let search = |pupil| self.search(&lens, pupil, &stop).map_err(refuse);
         let effects = design.report(&opened.lens, &opened.file)?;
         let (sweep, ms) = search(PupilEdge::Moving)?;

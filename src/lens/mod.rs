@@ -61,7 +61,7 @@ pub use grin::{GradientIndex, ParaxialGrin};
 pub use ideal::{IdealAction, IdealElement};
 pub use operand::{IndexRange, OperandKind, TermScope, TermSelection, last_index};
 pub use parameter::{Parameter, Quantity};
-pub use perturbation::{Perturbation, PerturbationKind};
+pub use perturbation::{Perturbation, PerturbationKind, TableUnit};
 pub use pose::{Pose, RigidMotion};
 pub use resolve::paraxial_image_distance;
 pub use section::LensSection;

@@ -141,6 +141,32 @@ impl PerturbationKind {
     }
 }
 
+/// The unit in which tables show an error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TableUnit {
+    /// Its name in a file, `1` for a number without one.
+    pub name: &'static str,
+    /// The number of them in one unit of the computation, which is in mm, radians and shares.
+    pub factor: f64,
+}
+
+impl PerturbationKind {
+    /// The unit in which tables show this error: tilts in minutes of arc, the Abbe number in per cent.
+    pub fn table_unit(self) -> TableUnit {
+        let unit = |name| TableUnit { name, factor: 1.0 };
+        match self {
+            _ if self.is_angle() => {
+                TableUnit { name: "arcmin", factor: 60.0 * 1.0_f64.to_degrees() }
+            }
+            Self::Abbe => TableUnit { name: "%", factor: 100.0 },
+            Self::Curvature => unit("1/mm"),
+            Self::Asphere => unit("1/mm^3"),
+            Self::Conic | Self::Index => unit("1"),
+            _ => unit("mm"),
+        }
+    }
+}
+
 impl Perturbation {
     /// An error of one surface, or of the gap behind it.
     pub fn of_surface(kind: PerturbationKind, surface: usize) -> Self {

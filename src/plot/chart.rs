@@ -11,6 +11,8 @@ const MOST_TICKS: f64 = 8.0;
 const END_TOLERANCE: f64 = 1e-6;
 /// The distance of tick labels from an axis, in pixels.
 const PADDING: f64 = 10.0;
+/// The length of a tick outside a frame, in pixels.
+const TICK: f64 = 6.0;
 /// Half the height of a letter, in pixels: ticks and samples are centred on their names.
 const HALF_LETTER: f64 = 7.0;
 
@@ -33,6 +35,13 @@ impl Axis {
         let step = round_step(width / TICKS);
         let (low, high) = ((low / step).floor() * step, (high / step).ceil() * step);
         let high = if high > low { high } else { low + step };
+        Self { name: name.to_owned(), low, high, step, logarithmic: false }
+    }
+
+    /// A linear axis with exactly these ends, at which there need not be ticks.
+    pub fn spanning(name: &str, low: f64, high: f64) -> Self {
+        let high = if high > low { high } else { low + 1.0 };
+        let step = round_step((high - low) / TICKS);
         Self { name: name.to_owned(), low, high, step, logarithmic: false }
     }
 
@@ -167,6 +176,25 @@ impl Chart {
         canvas.text(above, &self.y.name, BLACK, TextAlign::Left);
     }
 
+    /// Draws a frame with ticks outside, their labels and the names of the axes around a picture.
+    pub fn draw_ticks(&self, canvas: &mut Canvas) {
+        self.draw_frame(canvas);
+        for (share, label) in self.x.ticks() {
+            let x = self.left + (self.right - self.left) * share;
+            canvas.line([x, self.bottom], [x, self.bottom + TICK], BLACK);
+            canvas.text([x, self.bottom + PADDING], &label, BLACK, TextAlign::Middle);
+        }
+        for (share, label) in self.y.ticks() {
+            let y = self.bottom - (self.bottom - self.top) * share;
+            canvas.line([self.left - TICK, y], [self.left, y], BLACK);
+            canvas.text([self.left - PADDING, y - HALF_LETTER], &label, BLACK, TextAlign::Right);
+        }
+        let middle = 0.5 * (self.left + self.right);
+        canvas.text([middle, self.bottom + 46.0], &self.x.name, BLACK, TextAlign::Middle);
+        let above = [self.left - PADDING, self.top - 24.0];
+        canvas.text(above, &self.y.name, BLACK, TextAlign::Left);
+    }
+
     fn draw_grid(&self, canvas: &mut Canvas) {
         for (share, label) in self.x.ticks() {
             let x = self.left + (self.right - self.left) * share;
@@ -241,6 +269,15 @@ mod tests {
         assert_eq!(axis.fraction(0.0), 0.0);
         let labels: Vec<String> = axis.ticks().map(|line| line.1).collect();
         assert_eq!([&labels[0], &labels[3]], ["1e-3", "1e0"]);
+    }
+
+    #[test]
+    fn an_axis_that_spans_a_picture_has_its_ends_and_round_ticks() {
+        let axis = Axis::spanning("mm", -1.1, 1.1);
+        assert_eq!((axis.low, axis.high), (-1.1, 1.1));
+        let ticks: Vec<(f64, String)> = axis.ticks().collect();
+        assert!(ticks.len() >= 3 && ticks.iter().all(|(share, _)| (0.0..=1.0).contains(share)));
+        assert_eq!(ticks[ticks.len() / 2].1, "0");
     }
 
     #[test]

@@ -1,8 +1,10 @@
 //! Tolerances and the lenses that are made as files: a table as CSV, charts as PNG.
 
-use crate::lens::{Perturbation, SurfaceNumber, ToleranceSheet};
+use crate::lens::{Perturbation, SurfaceNumber, TableUnit, ToleranceSheet};
 use crate::plot::{ChartCurve, CurveChart, CurveSheet};
-use crate::tolerance::{AsBuiltSpot, SpotHistogram, ToleranceAnalysis, ToleranceError, yield_band};
+use crate::tolerance::{
+    AsBuiltSpot, FocusTreatment, SpotHistogram, ToleranceAnalysis, ToleranceError, yield_band,
+};
 
 /// The names of the treatments of the focus.
 const FOCUS: [&str; 2] = ["fixed focus", "refocused"];
@@ -23,8 +25,9 @@ pub struct FurtherColumns {
     pub cells: Vec<String>,
 }
 
-/// The tolerances with their effects, a line each, that with the largest refocused share first; angles
-/// are in radians and surfaces are counted from 0.
+/// The tolerances with their effects, a line each, that with the largest share first; numbers are in the
+/// unit of the line, as in tables: tilts in minutes of arc, the Abbe number in per cent. Surfaces are counted
+/// from 1.
 ///
 /// # Errors
 /// Correlations that no errors can have.
@@ -32,28 +35,33 @@ pub fn tolerance_table(
     sheet: &ToleranceSheet,
     analysis: &ToleranceAnalysis,
     further: &FurtherColumns,
+    order: FocusTreatment,
 ) -> Result<String, ToleranceError> {
-    let mut text = "kind,first,last,half_range,sigma,distribution,fixed_first,fixed_second,\
-                    fixed_share,refocused_first,refocused_second,refocused_share"
-        .to_owned();
+    let mut text =
+        "kind,first_surface,last_surface,unit,half_range (unit),sigma (unit),distribution,\
+                    fixed_first (mm^2/unit),fixed_second (mm^2/unit^2),fixed_share,\
+                    refocused_first (mm^2/unit),refocused_second (mm^2/unit^2),refocused_share"
+            .to_owned();
     text.push_str(&further.heads);
     text.push_str("\r\n");
-    for (i, [fixed, refocused]) in sorted_shares(sheet, analysis)? {
+    for (i, [fixed, refocused]) in sorted_shares(sheet, analysis, order)? {
         let own = &sheet.errors[i];
+        let TableUnit { name: unit, factor } = own.error.kind.table_unit();
         let distribution = serde_json::to_value(own.distribution).unwrap_or_default();
         let [by, adjusted] = &analysis.forms;
         let cells = [
             own.error.kind.name().replace(',', ""),
-            own.error.first.to_string(),
-            own.error.last.to_string(),
-            own.half_range.to_string(),
-            own.deviation().to_string(),
+            SurfaceNumber::new(own.error.first).to_string(),
+            SurfaceNumber::new(own.error.last).to_string(),
+            unit.to_owned(),
+            (factor * own.half_range).to_string(),
+            (factor * own.deviation()).to_string(),
             distribution.as_str().unwrap_or_default().to_owned(),
-            by.first[i].to_string(),
-            by.second.of(i, i).to_string(),
+            (by.first[i] / factor).to_string(),
+            (by.second.of(i, i) / (factor * factor)).to_string(),
             fixed.to_string(),
-            adjusted.first[i].to_string(),
-            adjusted.second.of(i, i).to_string(),
+            (adjusted.first[i] / factor).to_string(),
+            (adjusted.second.of(i, i) / (factor * factor)).to_string(),
             refocused.to_string(),
         ];
         text.push_str(&cells.join(","));
@@ -63,13 +71,16 @@ pub fn tolerance_table(
     Ok(text)
 }
 
-/// The errors by their numbers with their shares, that with the largest refocused one first.
+/// The errors by their numbers with their shares, that with the largest one first, at the fixed image plane
+/// or refocused.
 fn sorted_shares(
     sheet: &ToleranceSheet,
     analysis: &ToleranceAnalysis,
+    order: FocusTreatment,
 ) -> Result<Vec<(usize, [f64; 2])>, ToleranceError> {
     let mut shares: Vec<_> = analysis.growth_shares(sheet)?.into_iter().enumerate().collect();
-    shares.sort_by(|a, b| b.1[1].total_cmp(&a.1[1]));
+    let plane = usize::from(order == FocusTreatment::Refocused);
+    shares.sort_by(|a, b| b.1[plane].total_cmp(&a.1[plane]));
     Ok(shares)
 }
 
@@ -84,7 +95,7 @@ pub fn tolerance_sheet(
 ) -> Result<CurveSheet, ToleranceError> {
     let histograms = [0, 1].map(|which| histogram(analysis, which));
     let yields = [0, 1].map(|which| yield_chart(analysis, which));
-    let bars = pareto(sheet, &sorted_shares(sheet, analysis)?);
+    let bars = pareto(sheet, &sorted_shares(sheet, analysis, FocusTreatment::Refocused)?);
     Ok(CurveSheet {
         title: format!("{title}: lenses as made"),
         rows: vec![histograms.into(), yields.into(), vec![bars]],

@@ -68,20 +68,24 @@ fn plot_section(task: &GrinTask, medium: &GrinField) -> Canvas {
         gray_level(1.0 - 0.7 * (field.sample(p).index - extremes.low) / range)
     };
     let colors: Vec<_> = (0..CELLS * CELLS).map(shade).collect();
-    let mut canvas = Canvas::new([900, 960]);
-    let (corner, side) = ([50.0, 110.0], 4.0 * CELLS as f64);
+    let mut canvas = Canvas::new([960, 1030]);
+    let (corner, side) = ([110.0, 110.0], 4.0 * CELLS as f64);
     let place = |p: Vec3<f64>| {
         let share = |v: f64, low: f64, high: f64| (v - low) / (high - low);
         [corner[0] + side * share(p.z, low.z, high.z), corner[1] + side * share(p.x, high.x, low.x)]
     };
-    canvas.text([450.0, 30.0], &task.name, BLACK, TextAlign::Middle);
+    let middle = corner[0] + 0.5 * side;
+    canvas.text([middle, 20.0], &task.name, BLACK, TextAlign::Middle);
     let scale = format!("index {:.4} (light) to {:.4} (dark)", extremes.low, extremes.high);
-    canvas.text([450.0, 66.0], &scale, GREY, TextAlign::Middle);
+    canvas.text([middle, 52.0], &scale, GREY, TextAlign::Middle);
     canvas.raster(corner, CELLS, 4, &colors);
     for path in paths(task, field) {
         let points: Vec<[f64; 2]> = path.into_iter().map(place).collect();
         canvas.curve(&points, PALETTE[0], Stroke::Solid);
     }
+    let z = Axis::spanning("z, mm (light travels to the right)", low.z, high.z);
+    let x = Axis::spanning("x, mm", low.x, high.x);
+    Chart::new(corner, corner.map(|edge| edge + side), z, x).draw_ticks(&mut canvas);
     canvas
 }
 

@@ -80,6 +80,16 @@ pub enum ToleranceError {
         /// The tolerances, in words.
         what: &'static str,
     },
+    /// Tolerances are asked for with which lenses are better than the one without errors.
+    #[error(
+        "found {found} mm; expected more than {nominal:.6} mm, the rms of the lens without errors"
+    )]
+    BelowNominal {
+        /// The rms spot radius that is asked for in mm.
+        found: f64,
+        /// That of the lens without errors in mm.
+        nominal: f64,
+    },
     /// The analysis was told to stop before it had a result.
     #[error("stopped before there is a result")]
     Stopped,

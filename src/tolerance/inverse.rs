@@ -18,12 +18,8 @@ pub fn loosest_tolerances(
     target: f64,
 ) -> Result<Vec<Tolerance>, ToleranceError> {
     if !(target > form.nominal) {
-        let rms = form.nominal.max(0.0).sqrt();
-        return Err(ToleranceError::Other(format!(
-            "an rms of {} mm is asked for; expected more than {rms:.6} mm, that of the lens without \
-             errors",
-            target.max(0.0).sqrt()
-        )));
+        let (found, nominal) = (target.max(0.0).sqrt(), form.nominal.max(0.0).sqrt());
+        return Err(ToleranceError::BelowNominal { found, nominal });
     }
     let (factors, total) = equal_costs(form, sheet)?;
     let scale = if total > 0.0 { ((target - form.nominal) / total).sqrt() } else { 1.0 };
@@ -108,11 +104,8 @@ pub fn loosest_for_yield(
         return Err(ToleranceError::Other(text));
     }
     if !(limit * limit > form.as_designed()) {
-        let rms = form.as_designed().sqrt();
-        return Err(ToleranceError::Other(format!(
-            "lenses with an rms of {limit} mm are asked for; expected more than {rms:.6} mm, that of \
-             the lens without errors"
-        )));
+        let (found, nominal) = (limit, form.as_designed().sqrt());
+        return Err(ToleranceError::BelowNominal { found, nominal });
     }
     let (factors, _) = equal_costs(form, sheet)?;
     let shaped = widened(&sheet.errors, |i| factors[i]);

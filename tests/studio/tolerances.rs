@@ -13,7 +13,7 @@ use aplanat::session::{
 };
 use aplanat::studio::file_dialog::FileRequest;
 use aplanat::studio::panels::TolerancesPanel;
-use aplanat::tolerance::ToleranceGrade;
+use aplanat::tolerance::{FocusTreatment, ToleranceGrade};
 use egui::Key;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
@@ -281,10 +281,11 @@ fn what_the_panel_shows_is_written_as_a_table_and_as_charts() {
     let kinds = [PaperKind::ToleranceTable, PaperKind::ToleranceCharts];
     assert_eq!(harness.state().requests, kinds.map(FileRequest::ExportPaper));
     let made = made(&harness);
-    let table = tolerance_table(&made.sheet, &made.analysis, &FurtherColumns::default()).unwrap();
+    let (further, order) = (FurtherColumns::default(), FocusTreatment::Refocused);
+    let table = tolerance_table(&made.sheet, &made.analysis, &further, order).unwrap();
     assert_eq!(table.lines().count(), 1 + made.sheet.errors.len());
     let columns = table.lines().map(|line| line.split(',').count());
-    assert!(columns.into_iter().all(|count| count == 12), "{table}");
+    assert!(columns.into_iter().all(|count| count == 13), "{table}");
     let sheet = tolerance_sheet("achromat", &made.sheet, &made.analysis).unwrap();
     assert!(sheet.canvas().png().unwrap().starts_with(b"\x89PNG"));
 }

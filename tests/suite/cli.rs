@@ -905,7 +905,10 @@ fn a_grin_task_is_optimized_and_written_as_a_volume() {
     let ms = stopped["ms"].as_f64().unwrap();
     assert!(ms > 0.0 && ms < whole, "{ms} of {whole}");
     assert_eq!(stopped["steps"], 2);
-    assert_eq!(stopped["stopped"], true);
+    assert_eq!(
+        (&stopped["stopped"], stopped["end"].as_str()),
+        (&json!(true), Some("iteration_limit"))
+    );
     // A search that ends when its 0.03 minutes are over has lasted as long.
     let late = done_json(&["grin", "luneburg", "--minutes", "0.03"], "");
     assert!(late["stopped"] == true && late["ms"].as_f64().unwrap() >= 1800.0, "{late}");

@@ -546,6 +546,7 @@ fn are_saved_when_asked_to_end(folder: &Folder, wait: u64) -> bool {
     fs::create_dir(folder.path("gone")).unwrap();
     let scene = ["--scene", "target", "--pixels", "1200x800"];
     let exact = ["--exact", "--error", "1e-6", "--max-samples", "100000000", "--out", &outs[0]];
+    let exact = [&exact[..], &["--coating", "none"]].concat();
     let mapped = ["--quick", "--error-map", &error_map, "--out", &outs[1]];
     let commands = [
         [&["picture", LENS][..], &scene, &exact].concat(),
@@ -570,6 +571,8 @@ fn are_saved_when_asked_to_end(folder: &Folder, wait: u64) -> bool {
     assert_eq!(codes, [Some(1), Some(0), Some(0)], "{said:?}");
     let words = ["stopped; what was not sampled is black", "the picture is kept as"];
     assert!(words.iter().all(|word| said[0].contains(word)), "{}", said[0]);
+    let told = text(&ended[0].stdout);
+    assert!(told.contains("ghosts (not computed, since the picture was stopped)"), "{told}");
     let kept = fs::read_dir(&spare).unwrap().map(|entry| entry.unwrap().file_name());
     let kept: Vec<_> = kept.collect();
     assert_eq!(kept.len(), 1, "{kept:?} {said:?}");

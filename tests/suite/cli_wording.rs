@@ -1,6 +1,6 @@
 //! What the command line says: notes, tables with heads, refusals that name the right file and number.
 
-use super::cli::{Scratch, aplanat, done, refused};
+use super::cli::{Scratch, aplanat, done, done_json, refused};
 use serde_json::json;
 
 const GAUSS: &str = "lenses/double_gauss_rudolph_50.json";
@@ -147,5 +147,105 @@ fn tables_have_heads_and_no_rounding_noise() {
         let text = analyzed(what);
         let is_head = |line: &str| heads.iter().all(|head| line.contains(head));
         assert!(text.lines().skip(1).any(is_head), "{text}");
+    }
+}
+
+/// Encircled energy says as contrast does that it did not reach its tolerance.
+#[test]
+fn encircled_energy_says_whether_its_tolerance_was_reached() {
+    let asked = |error: &'static str| {
+        ["analyze", ACHROMAT, "encircled-energy", "--field=0", "--radii=0.002", "--error", error]
+    };
+    let text = done(&asked("1e-15"), "");
+    assert!(text.contains("tolerance not reached: limited by the number of rays"), "{text}");
+    let found = &done_json(&asked("1%"), "")["fields"][0];
+    assert!(found["reached"] == true && found["limit"].is_null(), "{found}");
+}
+
+/// Drawn contrast begins at frequency 0, beside that of a lens without aberrations; a drawn image spans its light.
+#[test]
+fn drawn_contrast_and_images_have_all_of_their_range() {
+    let svg = Scratch::new("range.svg");
+    let drawn = |more: &[&str]| {
+        let arguments = ["analyze", SINGLET, "--field=0", "--error=10%", "--plot", svg.path()];
+        done_json(&[&arguments[..], more].concat(), "");
+        std::fs::read_to_string(svg.path()).unwrap()
+    };
+    let text = drawn(&["mtf", "--frequencies", "20,40"]);
+    assert!(text.contains("diffraction limit, f/"), "{text}");
+    // The curves of rays: the polyline of the legend aside, each begins at the axis of contrast.
+    let first = |line: &str| -> Option<f64> {
+        let points = line.split("points=\"").nth(1)?;
+        points.split([',', ' ', '"']).next()?.parse().ok()
+    };
+    let starts: Vec<f64> =
+        text.lines().filter(|line| line.contains("polyline")).filter_map(first).collect();
+    let left = starts.iter().copied().fold(f64::INFINITY, f64::min);
+    let at_axis = starts.iter().filter(|x| (**x - left).abs() < 1e-6).count();
+    assert!(at_axis >= 5, "{starts:?}");
+    refused(2, &["analyze", SINGLET, "psf", "--reach", "5"], "", &["--plot"]);
+    let wrong = ["analyze", SINGLET, "psf", "--plot", svg.path(), "--reach", "-5"];
+    refused(2, &wrong, "", &["error: --reach: found -5; expected um"]);
+}
+
+/// Wrong options are blamed by their names, and say what was expected.
+#[test]
+fn wrong_options_are_blamed_by_their_names() {
+    let png = Scratch::new("blamed.png");
+    let picture = |more: &[&'static str]| {
+        let own = ["picture", SINGLET, "--scene", "target", "--out"];
+        [&own[..], &[png.path()], more].concat().iter().map(|word| (*word).to_owned()).collect()
+    };
+    let words = |arguments: &[&str]| -> Vec<String> {
+        arguments.iter().map(|word| (*word).to_owned()).collect()
+    };
+    let cases: Vec<(Vec<String>, &str)> = vec![
+        (
+            words(&["analyze", SINGLET, "spot", "--field", "100"]),
+            "--field: found 100; expected a field",
+        ),
+        (words(&["gradient", SINGLET, "--field", "100"]), "--field: found 100; expected a field"),
+        (words(&["measure", "spot", SINGLET, "--field", "100"]), "--field: found 100; expected"),
+        (words(&["analyze", SINGLET, "spot", "--zoom", "3"]), "--zoom: no zoom position 3 in"),
+        (words(&["tolerance", ZOOM, "--zoom", "3"]), "--zoom: no zoom position 3 in"),
+        (words(&["analyze", SINGLET, "ghosts", "--ghosts", "0"]), "--ghosts: found 0; expected 1"),
+        (
+            words(&["analyze", SINGLET, "thermal", "--temperatures", "-1000"]),
+            "--temperatures: temperature is -1000; expected",
+        ),
+        (
+            words(&["analyze", SINGLET, "illumination", "--wave", "1,2,3", "--distance", "-5"]),
+            "--distance: the distance of a plane is -5; expected",
+        ),
+        (words(&["search", SINGLET, "--steps", "0"]), "--steps: the number of steps"),
+        (words(&["search", SINGLET, "--chains", "0"]), "--chains: found 0; expected 1 or more"),
+        (words(&["search", SINGLET, "--wavelength", "99"]), "--wavelength: SCHOTT N-BK7"),
+        (picture(&["--diagonal", "-3"]), "--diagonal: found -3; expected mm, more than 0"),
+        (picture(&["--focus", "10"]), "--focus: an object 10 mm in front of the lens"),
+        (picture(&["--focus", "-10"]), "--focus: found -10; expected mm"),
+        (picture(&["--distance", "-10"]), "--distance: found -10; expected mm"),
+        (picture(&["--size", "5"]), "--size: the width of the scene is 5; expected"),
+        (picture(&["--focus=500", "--focus-group=7..10"]), "--focus-group: found 7..10; expected"),
+        (picture(&["--max-samples", "0"]), "--max-samples: found 0; expected 1 or more"),
+        (
+            picture(&["--sensor=phone", "--quantum-efficiency=3"]),
+            "--quantum-efficiency: found 3; expected more than 0",
+        ),
+        (
+            words(&["tolerance", SINGLET, "--seed", "-1"]),
+            "invalid value '-1' for '--seed <N>': expected a whole number, 0 or more",
+        ),
+        (
+            words(&["analyze", SINGLET, "spot", "--zoom", "x"]),
+            "invalid value 'x' for '--zoom <N>': expected a whole number, 0 or more",
+        ),
+        (
+            words(&["optimize", SINGLET, "--out", "x.json", "--steps", "99999999999999999999999"]),
+            "invalid value '99999999999999999999999' for '--steps <N>': expected a smaller whole number",
+        ),
+    ];
+    for (arguments, expected) in &cases {
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        refused(2, &arguments, "", &[&format!("error: {expected}")[..]]);
     }
 }

@@ -108,13 +108,13 @@ fn search_says_what_is_wrong_with_its_arguments() {
     wrong(&["--minutes", "-1"], &["--minutes", "found -1", "more than 0"]);
     wrong(&["--chains", "1000000"], &["chains", "1000000", "1024"]);
     wrong(&["--steps", "1000000000"], &["steps", "1000000000", "10000"]);
-    wrong(&["--c", "-1"], &["setting c", "0 or more"]);
+    wrong(&["--c", "-1"], &["error: --c: found -1", "0 or more"]);
     wrong(&["--gamma", "-1e300"], &["gamma", "-1e300", "0 to 1"]);
     wrong(&["--temperature", "nan"], &["0 or more"]);
     wrong(&["--temperature", "-1"], &["0 or more"]);
     wrong(&["--error", "200%"], &["--error", "less than 100%"]);
     wrong(&["--method", "brute", "--chains", "0"], &["chains", "1 or more"]);
-    wrong(&["--method", "metropolis", "--c", "-1"], &["setting c"]);
+    wrong(&["--method", "metropolis", "--c", "-1"], &["error: --c: found -1"]);
     wrong(&["--light", "-1"], &["--light", "found -1"]);
     wrong(&["--open", "0"], &["--open", "more than 0"]);
     wrong(&["--heights", "0,7"], &["--heights", "--focal-length"]);
@@ -124,7 +124,7 @@ fn search_says_what_is_wrong_with_its_arguments() {
     wrong(&["--chains", "0"], &["chains", "1 or more"]);
     wrong(&["--reservoir", "0"], &["reservoir", "1 or more"]);
     wrong(&["--gamma", "2"], &["gamma", "0 to 1"]);
-    wrong(&["--c=-1"], &["setting c", "0 or more"]);
+    wrong(&["--c=-1"], &["error: --c: found -1", "0 or more"]);
     wrong(&["--steps", "0"], &["steps", "1 or more"]);
     wrong(&["--error", "0"], &["more than 0"]);
     wrong(&["--method", "brute", "--minutes", "1"], &["gradients", "brute force"]);

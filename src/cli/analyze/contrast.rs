@@ -1,7 +1,7 @@
 //! The modulation transfer function: against frequency, and through focus.
 
-use super::{AnalysisRun, AtField, SelectedField, TextLines};
-use crate::analysis::{AnalysisError, diffraction_mtf};
+use super::{AnalysisRun, AtField, SelectedField, TextLines, not_reached_text};
+use crate::analysis::{AnalysisError, diffraction_mtf, perfect_contrast};
 use crate::analysis::{
     DiffractionGate, MtfCurve, MtfPoint, diffraction_gate, geometric_mtf,
     polychromatic_diffraction_mtf, polychromatic_geometric_mtf, through_focus_mtf,
@@ -19,6 +19,41 @@ pub(super) struct MtfJson {
     geometric: CurveJson,
     polychromatic_diffraction: CurveJson,
     polychromatic_geometric: CurveJson,
+    /// The contrast without aberrations, if it is drawn.
+    #[serde(skip)]
+    limit: Option<DiffractionLimit>,
+}
+
+/// The contrast of a lens without aberrations with a round pupil on the axis, at all wavelengths.
+struct DiffractionLimit {
+    f_number: f64,
+    /// Frequencies in cycles/mm and contrasts.
+    points: Vec<[f64; 2]>,
+}
+
+/// The points of the drawn contrast without aberrations.
+const LIMIT_POINTS: u32 = 60;
+
+impl DiffractionLimit {
+    /// That of a lens up to a frequency in cycles/mm; `None` of an afocal one.
+    fn new(run: &AnalysisRun, highest: f64) -> Option<Self> {
+        let f_number = run.model.first_order.working_f_number?.abs();
+        let colors = &run.model.channels;
+        let weights: f64 = colors.iter().map(|color| color.weight).sum();
+        let at = |i: u32| {
+            let frequency = highest * f64::from(i) / f64::from(LIMIT_POINTS);
+            let contrast = colors.iter().map(|color| {
+                color.weight * perfect_contrast(frequency * 1e-3 * color.um * f_number)
+            });
+            [frequency, contrast.sum::<f64>() / weights]
+        };
+        Some(Self { f_number, points: (0..=LIMIT_POINTS).map(at).collect() })
+    }
+
+    fn curve(&self) -> ChartCurve {
+        let name = format!("diffraction limit, f/{:.2}", self.f_number);
+        ChartCurve::new(name, 0, self.points.iter().map(|[x, y]| (*x, Some(*y)))).neutral()
+    }
 }
 
 /// The decision about diffraction, or the reason why there is none.
@@ -71,6 +106,7 @@ pub(super) fn contrasts(run: &AnalysisRun) -> Vec<AtField<MtfJson>> {
             polychromatic_geometric: CurveJson::of(|| {
                 polychromatic_geometric_mtf(model, field, nu, accuracy)
             }),
+            limit: run.is_drawn.then(|| DiffractionLimit::new(run, highest)).flatten(),
         });
         AtField::new(chosen, keys)
     };
@@ -99,8 +135,7 @@ impl TextLines for MtfJson {
             match curve {
                 CurveJson::Refused { refused } => lines.push(format!("{name}: {refused}")),
                 CurveJson::Curve { milliseconds, curve } => {
-                    let limit = |limit| format!(", tolerance not reached: {limit}");
-                    let reached = curve.limit.map_or_else(String::new, limit);
+                    let reached = not_reached_text(curve.limit);
                     let rays = counted(curve.rays, "ray");
                     lines.push(format!("{name}: {rays}, {milliseconds:.3} ms{reached}"));
                     lines.push(column_heads("cycles/mm"));
@@ -113,16 +148,28 @@ impl TextLines for MtfJson {
 
     fn charts(&self) -> Vec<CurveChart> {
         let curves = |(color, name, curve): (usize, &str, &CurveJson)| match curve {
-            CurveJson::Curve { curve, .. } => contrast_curves(name, color, &curve.points),
+            CurveJson::Curve { curve, .. } => {
+                let curves = contrast_curves(name, color, &curve.points);
+                curves.into_iter().map(from_zero).collect()
+            }
             CurveJson::Refused { .. } => Vec::new(),
         };
         let both = [
             (0, "diffraction", &self.polychromatic_diffraction),
             (1, "rays", &self.polychromatic_geometric),
         ];
-        let curves = both.into_iter().flat_map(curves).collect();
+        let limit = self.limit.as_ref().map(DiffractionLimit::curve);
+        let curves = both.into_iter().flat_map(curves).chain(limit).collect();
         vec![CurveChart::new("all wavelengths", ["cycles/mm", "contrast"], curves)]
     }
+}
+
+/// A curve of contrast that begins at frequency 0, where it is 1.
+fn from_zero(mut curve: ChartCurve) -> ChartCurve {
+    if let Some(first) = curve.pieces.first_mut().filter(|piece| piece[0][0] > 0.0) {
+        first.insert(0, [0.0, 1.0]);
+    }
+    curve
 }
 
 /// The tangential contrast, full, and the sagittal one, dashed.

@@ -26,7 +26,7 @@ use super::failures::Failures;
 use super::input::{LensFile, LoadedLens, Tolerance};
 use super::output::{Output, ShortNumber, counted, without_rounding};
 use super::output_paths::OutputPaths;
-use crate::analysis::{AnalysisError, Coating, Estimate};
+use crate::analysis::{AnalysisError, Coating, ContrastLimit, Estimate};
 use crate::effects::{self, Effect, EffectPlan, TracePurpose};
 use crate::files;
 use crate::lens::{FieldKind, FieldPoint, SurfaceNumber};
@@ -50,7 +50,8 @@ pub(super) struct AnalyzeArgs {
     /// The analysis
     what: AnalysisKind,
 
-    /// Relative tolerance: `0.1%` or `1e-3`
+    /// Tolerance: `0.1%` or `1e-3`; relative for radii, the RMS wavefront and `illumination`; absolute for
+    /// contrast, for intensities over the perfect peak, for shares of the light and for coefficients in wavelengths
     #[arg(long, default_value = "0.1%", value_name = "TOLERANCE")]
     error: Tolerance,
 
@@ -74,6 +75,11 @@ pub(super) struct AnalyzeArgs {
     /// `illumination`, from the axis; may be repeated
     #[arg(long = "at", value_name = "X,Y", value_parser = parse_point, allow_hyphen_values = true)]
     points: Vec<[f64; 2]>,
+
+    /// The distance in um from the image point of the chief ray that --plot of `psf` reaches; absent: 5 lambda F,
+    /// or the circle with 99 % of the rays where that is larger
+    #[arg(long, value_name = "UM", requires = "plot")]
+    reach: Option<f64>,
 
     /// A point of the pupil for `wavefront`, as `px,py` in units of its radius; may be repeated; absent: a
     /// map of the disc
@@ -328,8 +334,10 @@ impl AnalyzeArgs {
             AnalysisKind::FieldCurvature => self.finish(&run, chief::curvatures(&run), output),
             AnalysisKind::Illumination => {
                 let wave = self.wave.map(|wave| illumination::wave_scene(wave, self.distance));
+                let is_far = self.distance.is_none_or(|distance| distance > 0.0);
+                let option = if is_far { "--wave" } else { "--distance" };
                 let scene =
-                    wave.transpose().map_err(|why| CliError::Input(format!("--wave: {why}")))?;
+                    wave.transpose().map_err(|why| CliError::Input(format!("{option}: {why}")))?;
                 self.finish(&run, illumination::illuminations(&run, scene.as_ref()), output)
             }
             AnalysisKind::ThroughFocus => self.finish(&run, focus::through_focus(&run)?, output),
@@ -387,9 +395,16 @@ impl AnalyzeArgs {
         failures.into_result()
     }
 
-    /// Refuses radii that are no positive numbers, frequencies below zero, and more frequencies than are
-    /// computed in a short time.
+    /// Refuses radii that are no positive numbers, frequencies below zero, more frequencies than are
+    /// computed in a short time, and no ghost.
     fn check_numbers(&self) -> Result<(), CliError> {
+        if self.ghosts == 0 {
+            return Err(CliError::Input("--ghosts: found 0; expected 1 or more".to_owned()));
+        }
+        if let Some(wrong) = self.reach.filter(|um| !(*um > 0.0 && *um <= 1e6)) {
+            let text = format!("--reach: found {wrong}; expected um, more than 0 and up to 1e6");
+            return Err(CliError::Input(text));
+        }
         if let Some(wrong) = self.radii.iter().find(|r| !(**r > 0.0 && r.is_finite())) {
             return Err(CliError::Input(format!(
                 "--radii: found {wrong}; expected mm, above zero"
@@ -417,6 +432,8 @@ const MOST_FREQUENCIES: usize = 1000;
 struct AnalysisRun {
     what: AnalysisKind,
     opened: LoadedLens,
+    /// The beginning of an error of the lens at these fields: its file, or the option that names a field.
+    blamed: String,
     plan: EffectPlan,
     model: RayModel,
     /// The selected fields.
@@ -429,6 +446,8 @@ struct AnalysisRun {
     points: Vec<[f64; 2]>,
     /// True if the result is drawn as well.
     is_drawn: bool,
+    /// The distance in mm that a drawn diffraction image reaches, if it is given.
+    reach: Option<f64>,
 }
 
 /// A selected field.
@@ -451,7 +470,8 @@ impl AnalysisRun {
         let chosen = analyze.field.map(|y| opened.field_at(y, zoom)).transpose()?;
         let extra = chosen.filter(|field| !listed.contains(field));
         let all: Vec<FieldPoint> = listed.iter().copied().chain(extra).collect();
-        let refuse = |source| CliError::RayModel { file: opened.file.clone(), source };
+        let blamed = opened.blame_field(analyze.field, zoom);
+        let refuse = |source| CliError::RayModel { file: blamed.clone(), source };
         let measured = effects::measure_effects_at(&opened.lens, zoom, &all).map_err(refuse)?;
         let plan = choices.plan(&measured, what.purpose(analyze.error.0));
         let model = effects::build_ray_model_at(&opened.lens, zoom, &all, &plan).map_err(refuse)?;
@@ -467,6 +487,7 @@ impl AnalysisRun {
         Ok(Self {
             what,
             opened,
+            blamed,
             plan,
             model,
             fields,
@@ -475,6 +496,7 @@ impl AnalysisRun {
             frequencies,
             points,
             is_drawn,
+            reach: analyze.reach.map(|um| 1e-3 * um),
         })
     }
 
@@ -521,7 +543,7 @@ impl AnalysisRun {
         if reason.is_loss_of_light() {
             return self.no_light(reason);
         }
-        CliError::Input(format!("{}: {reason}", self.opened.file))
+        CliError::Input(format!("{}: {reason}", self.blamed))
     }
 
     /// The error that there is no light, with the surface where most of it is lost.
@@ -544,6 +566,9 @@ impl AnalysisRun {
             let (name, total) = (fate.name(), fates.total());
             format!("{count} of {total} rays end {name} at surface {surface}")
         });
+        if self.blamed != self.opened.file {
+            return CliError::Input(format!("{}: {reason}: {place}", self.blamed));
+        }
         let file = &self.opened.file;
         CliError::Input(format!("{file}: {reason}: {place}; expected a lens that forms an image"))
     }
@@ -651,6 +676,11 @@ fn estimate_text(name: &str, estimate: &Estimate) -> String {
     let ms = milliseconds.map(|ms| format!(", {ms:.3} ms")).unwrap_or_default();
     let (value, rays) = (ShortNumber(without_rounding(value, error)), counted(rays, "ray"));
     format!("{name:<22} {value:>13} ± {error:.1e}   {rays}{ms}")
+}
+
+/// The cause of errors above the tolerance, as it follows the cost of numbers; empty if it was reached.
+fn not_reached_text(limit: Option<ContrastLimit>) -> String {
+    limit.map_or_else(String::new, |limit| format!(", tolerance not reached: {limit}"))
 }
 
 /// Computes a result and passes it with its milliseconds to `note`.

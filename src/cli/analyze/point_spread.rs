@@ -1,13 +1,14 @@
 //! The diffraction image of a point: intensities, Strehl ratios and encircled energy.
 
-use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text};
+use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text, not_reached_text};
 use crate::analysis::{
-    Estimate, PointSpread, ReferenceForm, Strehl, encircled_energy, point_spread, strehl,
+    ContrastLimit, Estimate, PointSpread, ReferenceForm, Strehl, encircled_energy, point_spread,
+    strehl,
 };
-use crate::cli::output::{ShortNumber, without_rounding};
+use crate::cli::output::{ShortNumber, counted, without_rounding};
 use crate::measure::time_ms;
 use crate::plot::{ChartCurve, CurveChart};
-use crate::pupil::Accuracy;
+use crate::pupil::{Accuracy, PupilPattern, pattern_points};
 use serde::Serialize;
 
 /// The diffraction image of a field.
@@ -20,6 +21,8 @@ pub(super) struct PointSpreadJson {
     center: [f64; 2],
     reference: ReferenceForm,
     reached: bool,
+    /// The cause of errors above the tolerance; `None` if it was reached.
+    limit: Option<ContrastLimit>,
     points: Vec<IntensityJson>,
     /// The rounding error of a length, in mm.
     #[serde(skip)]
@@ -75,16 +78,45 @@ pub(super) fn point_spreads(run: &AnalysisRun) -> Vec<AtField<PointSpreadJson>> 
     run.fields.iter().map(at).collect()
 }
 
-/// The points of a drawn profile on each side of its centre, and the distance that they reach in λF.
-const DRAWN: (i32, f64) = (40, 5.0);
+/// The points of a drawn profile for each λF, and their least and largest number on each side of its centre.
+const DRAWN: f64 = 8.0;
+const DRAWN_POINTS: [f64; 2] = [40.0, 200.0];
+/// The least distance that a drawn profile reaches, in λF: the circle holds 96 % of a perfect image.
+const LEAST_REACH: f64 = 5.0;
+/// The share of the rays within the distance that a drawn profile reaches, and the rays over the pupil.
+const DRAWN_SHARE: f64 = 0.99;
+const SPREAD_SIDE: usize = 32;
 /// The rays of the drawn profiles.
 const DRAWN_RAYS: usize = 100_000;
+
+/// The radius in mm of the circle about the image point of the chief ray that holds 99 % of the rays; `None`
+/// without light.
+fn circle_of_rays(run: &AnalysisRun, field: &SelectedField) -> Option<f64> {
+    let (model, primary) = (&run.model, run.model.primary);
+    let launch = model.launch(field.traced, primary).ok()?;
+    let landing = |point: [f64; 2]| {
+        let traced = model.channels[primary].tracer.trace(launch.ray(point)?);
+        traced.fate.is_imaged().then_some(traced.ray.point)
+    };
+    let chief = landing([0.0; 2])?;
+    let grid = pattern_points(PupilPattern::Square(SPREAD_SIDE));
+    let landed = grid.into_iter().filter_map(landing);
+    let mut distances: Vec<f64> =
+        landed.map(|point| (point.x - chief.x).hypot(point.y - chief.y)).collect();
+    distances.sort_by(f64::total_cmp);
+    let inside = (DRAWN_SHARE * distances.len() as f64).ceil() as usize;
+    distances.get(inside.saturating_sub(1)).copied().filter(|radius| radius.is_finite())
+}
 
 /// The intensities along x and along y through the image point of the chief ray, over the distance in
 /// micrometres.
 fn profiles(run: &AnalysisRun, field: &SelectedField) -> [Vec<[f64; 2]>; 2] {
-    let (count, reach) = DRAWN;
-    let place = |i: i32| f64::from(i) / f64::from(count) * reach * unit(run);
+    let reach = run
+        .reach
+        .unwrap_or_else(|| circle_of_rays(run, field).unwrap_or(0.0).max(LEAST_REACH * unit(run)));
+    let [least, most] = DRAWN_POINTS;
+    let count = (DRAWN * reach / unit(run)).ceil().clamp(least, most) as i32;
+    let place = |i: i32| f64::from(i) / f64::from(count) * reach;
     let along_x = (-count..=count).map(|i| [place(i), 0.0]);
     let along_y = (-count..=count).map(|i| [0.0, place(i)]);
     let points: Vec<[f64; 2]> = along_x.chain(along_y).collect();
@@ -109,9 +141,31 @@ fn keys(spread: &PointSpread, strehl: Strehl, points: &[[f64; 2]], ms: f64) -> P
         center: spread.center,
         reference: spread.reference,
         reached: spread.reached && strehl.reached,
+        limit: limit_of(spread, strehl),
         points: points.iter().zip(&spread.intensities).map(point).collect(),
         rounding: 0.0,
         profiles: Default::default(),
+    }
+}
+
+/// The largest error of the parts that did not reach the tolerance, which more rays would make smaller.
+fn limit_of(spread: &PointSpread, strehl: Strehl) -> Option<ContrastLimit> {
+    let image = spread.intensities.iter().chain([&spread.strehl]).map(|e| e.error);
+    let of_image = (!spread.reached).then(|| image.fold(0.0, f64::max));
+    let of_strehl = (!strehl.reached).then(|| strehl.at_chief.error.max(strehl.best.error));
+    of_image.into_iter().chain(of_strehl).reduce(f64::max).map(ContrastLimit::Nodes)
+}
+
+impl PointSpreadJson {
+    /// The head of the points: their number, what they cost, and whether they keep the tolerance.
+    fn points_head(&self) -> String {
+        let cost = self.points.first().map_or_else(String::new, |point| {
+            let Estimate { rays, milliseconds, .. } = point.intensity;
+            let ms = milliseconds.map(|ms| format!(", {ms:.3} ms")).unwrap_or_default();
+            format!(": {}{ms}", counted(rays, "ray"))
+        });
+        let points = counted(self.points.len(), "point");
+        format!("{points}{cost}{}", not_reached_text(self.limit))
     }
 }
 
@@ -133,15 +187,13 @@ impl TextLines for PointSpreadJson {
         if !self.best_is_global {
             lines.push("a local maximum: the blur is too large to be searched".to_owned());
         }
+        lines.push(self.points_head());
         lines.push(format!("{:>12}  {:>12}  intensity", "x, mm", "y, mm"));
         lines.extend(self.points.iter().map(|point| {
             let IntensityJson { x, y, intensity } = point;
             let [x, y] = [x, y].map(|v| ShortNumber(*v));
             format!("{x:>12}  {y:>12}  {:.6} ± {:.0e}", intensity.value, intensity.error)
         }));
-        if !self.reached {
-            lines.push("the tolerance was not reached".to_owned());
-        }
         lines
     }
 
@@ -169,6 +221,9 @@ const DARK: f64 = 1e-6;
 /// The encircled energy of a field.
 #[derive(Serialize)]
 pub(super) struct EncircledJson {
+    reached: bool,
+    /// The cause of errors above the tolerance; `None` if it was reached.
+    limit: Option<ContrastLimit>,
     circles: Vec<CircleJson>,
 }
 
@@ -193,8 +248,15 @@ pub(super) fn encircled(run: &AnalysisRun, asked: &[f64]) -> Vec<AtField<Encircl
             radius: *radius,
             energy: Estimate { milliseconds: Some(ms), ..energy },
         };
-        let keys = found
-            .map(|list| EncircledJson { circles: radii.iter().zip(list).map(circle).collect() });
+        let keys = found.map(|list| {
+            let largest = list.iter().map(|energy| energy.error).fold(0.0, f64::max);
+            let reached = largest <= run.accuracy.tolerance;
+            EncircledJson {
+                reached,
+                limit: (!reached).then_some(ContrastLimit::Nodes(largest)),
+                circles: radii.iter().zip(list).map(circle).collect(),
+            }
+        });
         AtField::new(field, keys)
     };
     run.fields.iter().map(at).collect()
@@ -212,7 +274,7 @@ impl TextLines for EncircledJson {
         let line = |circle: &CircleJson| {
             estimate_text(&ShortNumber(circle.radius).to_string(), &circle.energy)
         };
-        let head = format!("{:<22} {:>13}", "radius, mm", "share");
+        let head = format!("{:<22} {:>13}{}", "radius, mm", "share", not_reached_text(self.limit));
         std::iter::once(head).chain(self.circles.iter().map(line)).collect()
     }
 
@@ -222,5 +284,43 @@ impl TextLines for EncircledJson {
         let curve = ChartCurve::new("diffraction", 0, points);
         let axes = ["radius, mm", "share of the light"];
         vec![CurveChart::new("encircled energy", axes, vec![curve])]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An image of two points whose largest error is 0.02.
+    fn image(reached: bool) -> PointSpreadJson {
+        let spread = PointSpread {
+            intensities: vec![Estimate::new(0.5, 0.001, 900), Estimate::new(0.25, 0.02, 900)],
+            strehl: Estimate::new(0.5, 0.001, 900),
+            center: [0.0; 2],
+            reached,
+            reference: ReferenceForm::Plane,
+        };
+        let strehl = Strehl {
+            at_chief: spread.strehl,
+            best: Estimate::new(0.6, 0.5, 400),
+            best_at: [0.0; 3],
+            reached: true,
+        };
+        keys(&spread, strehl, &[[0.0; 2], [0.01, 0.0]], 2.0)
+    }
+
+    #[test]
+    fn an_image_says_where_its_tolerance_was_not_reached() {
+        let head = |image: &PointSpreadJson| {
+            image.lines().into_iter().find(|line| line.starts_with("2 points")).unwrap()
+        };
+        let (kept, missed) = (image(true), image(false));
+        assert_eq!(head(&kept), "2 points: 900 rays, 2.000 ms");
+        assert_eq!(
+            head(&missed),
+            "2 points: 900 rays, 2.000 ms, tolerance not reached: limited by the number of rays: 2.0e-2"
+        );
+        assert!(kept.limit.is_none() && kept.reached);
+        assert_eq!(missed.limit, Some(ContrastLimit::Nodes(0.02)));
     }
 }

@@ -53,11 +53,12 @@ pub(super) fn temperatures(
     if let Some(expansion) = mount {
         opened.lens.environment.mount_expansion = expansion;
     }
-    let refuse = |source: LensError| CliError::Input(format!("{}: {source}", run.opened.file));
-    opened.lens.check().map_err(refuse)?;
+    let refuse = |option: &str, source: LensError| CliError::Input(format!("{option}: {source}"));
+    opened.lens.check().map_err(|source| refuse("--mount", source))?;
     let mut warmed = Vec::new();
     for celsius in temperatures {
-        let lens = opened.lens.at_temperature(run.zoom, *celsius).map_err(refuse)?;
+        let lens = opened.lens.at_temperature(run.zoom, *celsius);
+        let lens = lens.map_err(|source| refuse("--temperatures", source))?;
         warmed.push(warm_lens(run, &lens, *celsius)?);
     }
     let mount_expansion = opened.lens.environment.mount_expansion;

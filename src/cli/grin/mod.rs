@@ -16,7 +16,7 @@ use crate::measure::{Stopwatch, peak_megabytes, processor_ms};
 use crate::picture::{ProjectedView, ProjectionSettings};
 use crate::plot::Canvas;
 use crate::report::{plot_grin_field, plot_grin_image};
-use report::{GrinCostSummary, GrinReport, ImageReport, UnsavedField};
+use report::{GrinCostSummary, GrinEnd, GrinReport, ImageReport, UnsavedField, loss_unit};
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::ops::ControlFlow;
@@ -79,11 +79,11 @@ impl GrinArgs {
             self.lines.then(|| StraightRaySolver::new(source_name(name), &task)).transpose()?;
         let mut runner = GrinOptimizer::new(&task).map_err(refuse)?;
         let (clock, before) = (Stopwatch::start(), processor_ms());
-        let mut worked = Ok(true);
+        let mut worked = Ok(GrinEnd::Converged);
         let stop = stop_flag();
         let memory = peak_megabytes(|| worked = self.search(&mut runner, clock, &stop));
-        let stopped =
-            !worked.map_err(|error| CliError::Failed(format!("{}: {error}", source_name(name))))?;
+        let end =
+            worked.map_err(|error| CliError::Failed(format!("{}: {error}", source_name(name))))?;
         let ms = 1e3 * clock.seconds();
         let processor_ms = processor_ms().zip(before).map(|(now, before)| now - before);
         // The field is saved before anything else is computed from it.
@@ -94,7 +94,7 @@ impl GrinArgs {
         let is_stopped = stop.load(Ordering::Relaxed);
         failures.note(self.write_images(&task, runner.best(), is_stopped, files));
         let mut report =
-            GrinReport::new(&runner, &GrinCostSummary { ms, processor_ms, memory, stopped })
+            GrinReport::new(&runner, &GrinCostSummary { ms, processor_ms, memory, end })
                 .map_err(|error| CliError::Failed(format!("{}: {error}", source_name(name))))?;
         let nodes = runner.best().nodes();
         report.field = unsaved.map(UnsavedField::from);
@@ -189,30 +189,35 @@ impl GrinArgs {
         Ok(())
     }
 
-    /// Steps until convergence, Ctrl-C or a maximum; true for convergence.
+    /// Steps until convergence, Ctrl-C or a maximum.
     fn search(
         &self,
         runner: &mut GrinOptimizer,
         clock: Stopwatch,
         stop: &AtomicBool,
-    ) -> Result<bool, grin_design::GrinTaskError> {
+    ) -> Result<GrinEnd, grin_design::GrinTaskError> {
+        let unit = loss_unit(&runner.task().views);
         let bar = progress_bar(0);
         let most = self.iterations.unwrap_or(usize::MAX);
         let late = |minutes: f64| clock.seconds() >= 60.0 * minutes;
         loop {
-            let over = stop.load(Ordering::Relaxed) || self.minutes.is_some_and(late);
-            if over || runner.steps() >= most {
+            let limits = [
+                (stop.load(Ordering::Relaxed), GrinEnd::Stopped),
+                (self.minutes.is_some_and(late), GrinEnd::TimeLimit),
+                (runner.steps() >= most, GrinEnd::IterationLimit),
+            ];
+            if let Some((_, end)) = limits.into_iter().find(|(is_over, _)| *is_over) {
                 runner.finish()?;
                 bar.finish_and_clear();
-                return Ok(false);
+                return Ok(end);
             }
             let progress = runner.step()?;
             bar.set_length(progress.max_steps as u64);
             bar.set_position(progress.step as u64);
-            bar.set_message(format!("{} nodes, loss {:.2e} mm^2", progress.nodes, progress.loss));
+            bar.set_message(format!("{} nodes, loss {:.2e}{unit}", progress.nodes, progress.loss));
             if progress.finished {
                 bar.finish_and_clear();
-                return Ok(true);
+                return Ok(GrinEnd::Converged);
             }
         }
     }

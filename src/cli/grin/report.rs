@@ -19,7 +19,33 @@ pub(super) struct GrinCostSummary {
     pub(super) ms: f64,
     pub(super) processor_ms: Option<f64>,
     pub(super) memory: Option<MemoryUse>,
-    pub(super) stopped: bool,
+    pub(super) end: GrinEnd,
+}
+
+/// The reason for which a search ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum GrinEnd {
+    /// All levels were done.
+    Converged,
+    /// `--iterations` were made.
+    IterationLimit,
+    /// `--minutes` were over.
+    TimeLimit,
+    /// It was asked to end.
+    Stopped,
+}
+
+impl GrinEnd {
+    /// The end as it follows the cost.
+    const fn words(self) -> &'static str {
+        match self {
+            Self::Converged => "",
+            Self::IterationLimit => ", iteration limit reached",
+            Self::TimeLimit => ", time limit reached",
+            Self::Stopped => ", stopped",
+        }
+    }
 }
 
 /// The printed result.
@@ -27,7 +53,11 @@ pub(super) struct GrinCostSummary {
 pub(super) struct GrinReport {
     name: String,
     stopped: bool,
+    end: GrinEnd,
     loss: f64,
+    /// The unit of the loss.
+    #[serde(skip)]
+    loss_unit: &'static str,
     views: Vec<ViewSummary>,
     error: Option<FieldDifference>,
     pub(super) lines: Option<StraightRayResult>,
@@ -189,7 +219,9 @@ impl GrinReport {
         let (integrator, step) = runner.tracing();
         Ok(Self {
             name: task.name.clone(),
-            stopped: cost.stopped,
+            stopped: cost.end != GrinEnd::Converged,
+            end: cost.end,
+            loss_unit: loss_unit(&task.views),
             loss,
             views: task.views.iter().zip(&views).map(view).collect(),
             error,
@@ -217,10 +249,10 @@ impl GrinReport {
 impl Display for GrinReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { name, steps, rays, ms, .. } = self;
-        let stopped = if self.stopped { ", stopped" } else { "" };
+        let end = self.end.words();
         writeln!(
             f,
-            "{name}: {steps} steps, {rays} rays forward and back, {:.2} s{stopped}",
+            "{name}: {steps} steps, {rays} rays forward and back, {:.2} s{end}",
             1e-3 * ms
         )?;
         let Self { nodes, parameters, integrator, step, .. } = self;
@@ -237,8 +269,9 @@ impl Display for GrinReport {
             Some(ms) => writeln!(f, "; processor time {:.2} s, all threads", 1e-3 * ms)?,
             None => writeln!(f)?,
         }
-        writeln!(f, "loss {:.4e} mm^2\n", self.loss)?;
-        let mut table = TextTable::new(&["view", "weight", "rms spot, mm", "rays", "excluded"]);
+        writeln!(f, "loss {:.4e}{}\n", self.loss, self.loss_unit)?;
+        let result = result_head(&self.views);
+        let mut table = TextTable::new(&["view", "weight", result, "rays", "excluded"]);
         for view in &self.views {
             let lost = view.excluded.iter().map(|(reason, count)| format!("{count} {reason}"));
             let lost: Vec<String> = lost.collect();
@@ -247,7 +280,8 @@ impl Display for GrinReport {
                 ShortNumber(view.weight).to_string(),
                 match view.quality_db {
                     Some(quality) => format!("{quality:.1} dB"),
-                    None => format!("{:.3e}", view.spot),
+                    None if result == SPOTS => format!("{:.3e}", view.spot),
+                    None => format!("{:.3e} mm", view.spot),
                 },
                 view.rays.to_string(),
                 if lost.is_empty() { "none".to_owned() } else { lost.join(", ") },
@@ -262,6 +296,30 @@ impl Display for GrinReport {
     }
 }
 
+/// The unit of the loss of some views, as it follows the number: that of images has none.
+pub(super) fn loss_unit(views: &[grin_design::LightView]) -> &'static str {
+    let counted = views.iter().filter(|view| view.weight > 0.0);
+    let (images, spots): (Vec<_>, Vec<_>) = counted.partition(|view| view.goal.is_image());
+    match (images.is_empty(), spots.is_empty()) {
+        (true, _) => " mm^2",
+        (false, true) => ", mean squared difference of images",
+        (false, false) => ", mm^2 of spots and the mean squared difference of images",
+    }
+}
+
+/// The head of the results of spots alone.
+const SPOTS: &str = "rms spot, mm";
+
+/// The head of the column of results.
+fn result_head(views: &[ViewSummary]) -> &'static str {
+    let images = views.iter().filter(|view| view.quality_db.is_some()).count();
+    match images {
+        0 => SPOTS,
+        _ if images == views.len() => "image quality (PSNR)",
+        _ => "rms spot or PSNR",
+    }
+}
+
 /// Writes the error of the field relative to the exact one.
 fn write_error(error: &FieldDifference, f: &mut fmt::Formatter<'_>) -> fmt::Result {
     let FieldDifference { relative, without_offset, offset, relative_to_contrast } = error;
@@ -272,4 +330,27 @@ fn write_error(error: &FieldDifference, f: &mut fmt::Formatter<'_>) -> fmt::Resu
     }
     let part = format!("{relative_to_contrast:.4} of the difference");
     writeln!(f, "which is {part} between the exact field and the start")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_loss_has_the_unit_of_its_views() {
+        let unit = |name: &str| {
+            let task = grin_design::find_builtin(name).unwrap().task().unwrap();
+            loss_unit(&task.views)
+        };
+        assert_eq!(unit("luneburg"), " mm^2");
+        assert_eq!(unit("display"), ", mean squared difference of images");
+    }
+
+    #[test]
+    fn a_search_that_ended_by_itself_was_not_stopped() {
+        let words =
+            [GrinEnd::Converged, GrinEnd::IterationLimit, GrinEnd::TimeLimit].map(GrinEnd::words);
+        assert_eq!(words, ["", ", iteration limit reached", ", time limit reached"]);
+        assert_eq!(GrinEnd::Stopped.words(), ", stopped");
+    }
 }

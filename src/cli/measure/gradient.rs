@@ -57,7 +57,8 @@ impl MeasureGradientArgs {
         let (measured, _) = with_bar(&stop_flag(), "curves", |report| {
             measure_gradients(&opened.lens, self.zoom, self.field, report)
         });
-        let measured = measured.map_err(|e| CliError::Input(format!("{}: {e}", opened.file)))?;
+        let blamed = opened.blame_field(self.field, self.zoom);
+        let measured = measured.map_err(|e| CliError::Input(format!("{blamed}: {e}")))?;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
         let pool = pool.map_err(|error| CliError::Failed(error.to_string()))?;
         let asked = (self.frequency, self.tolerance.0);

@@ -45,10 +45,11 @@ impl MeasureSpotArgs {
         let (curves, stopped) = with_bar(&stop_flag(), "curves", |report| {
             measure_spot_curves(&opened.lens, self.zoom, field, report)
         });
-        let curves = curves
-            .map_err(|e| CliError::Input(format!("{}, field {}: {e}", opened.file, field.y)))?;
+        let blamed = opened.blame_field(self.field, self.zoom);
+        let curves =
+            curves.map_err(|e| CliError::Input(format!("{blamed}: field {}: {e}", field.y)))?;
         if curves.rms_clipped.is_none() && !stopped {
-            return Err(CliError::no_light(&opened.file));
+            return Err(CliError::no_light(&blamed));
         }
         let title = format!("{}, field {}", opened.lens.name, ShortNumber(field.y));
         let mut failures = Failures::default();

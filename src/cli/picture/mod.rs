@@ -12,7 +12,7 @@ pub(super) use device::DeviceChoice;
 use super::analyze::parse_coating;
 use super::error::CliError;
 use super::failures::Failures;
-use super::input::{LensFile, Tolerance};
+use super::input::{LensFile, LoadedLens, Tolerance};
 use super::output::{Output, print_note};
 use super::output_paths::OutputPaths;
 use super::progress::stop_flag;
@@ -21,7 +21,7 @@ use crate::files::write_atomic;
 use crate::measure::time_ms;
 use crate::picture::{
     BitDepth, ColorBand, ErrorMap, FocusGroup, ImageFrame, IncludedEffects, OmittedEffect, Picture,
-    ToneCurve, encode_colors, encode_png, omitted_beside,
+    PictureError, ToneCurve, encode_colors, encode_png, omitted_beside,
 };
 use crate::pupil::RayModel;
 use render::RenderedPicture;
@@ -164,6 +164,7 @@ impl PictureArgs {
         let mut paths = OutputPaths::reading(lens.into_iter().chain(scene).chain(sensor_file));
         paths.file("--out", Some(&self.out), &["png"])?;
         paths.file("--error-map", self.error_map.as_deref(), &["png"])?;
+        self.check_numbers()?;
         let source = self.scene_source()?;
         let sensor = self.exposed.sensor()?;
         if !self.exact {
@@ -171,6 +172,7 @@ impl PictureArgs {
         }
         let opened = self.lens.open()?;
         opened.check_zoom(self.zoom)?;
+        self.check_group(&opened)?;
         let (picture, ms) = time_ms(|| self.render(&opened, &source, &stop_flag()));
         let (rendered, shot) = picture?;
         let picture = rendered.picture.clone();
@@ -185,6 +187,51 @@ impl PictureArgs {
         failures.note(self.save_error_map(rendered.error_map.as_ref()));
         failures.note(output.print(&report));
         failures.into_result()
+    }
+
+    /// Refuses lengths and counts that no picture has.
+    fn check_numbers(&self) -> Result<(), CliError> {
+        let lengths = [
+            ("--diagonal", self.diagonal, 1e6, "1e6"),
+            ("--distance", self.distance, 1e12, "1e12"),
+            ("--size", self.size, f64::MAX, "infinity"),
+            ("--focus", self.focus, 1e12, "1e12"),
+        ];
+        for (name, value, most, limit) in lengths {
+            if let Some(found) = value.filter(|value| !(*value > 0.0 && *value <= most)) {
+                let text =
+                    format!("{name}: found {found}; expected mm, more than 0 and below {limit}");
+                return Err(CliError::Input(text));
+            }
+        }
+        if self.max_samples == 0 {
+            return Err(CliError::Input("--max-samples: found 0; expected 1 or more".to_owned()));
+        }
+        Ok(())
+    }
+
+    /// Refuses a focus group that the lens does not have.
+    fn check_group(&self, opened: &LoadedLens) -> Result<(), CliError> {
+        let surfaces = opened.lens.surfaces.len();
+        match self.focus_group.filter(|group| group.last >= surfaces) {
+            Some(FocusGroup { first, last }) => Err(CliError::Input(format!(
+                "--focus-group: found {}..{}; expected surfaces from 1 to {surfaces}",
+                first + 1,
+                last + 1
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// The error of a picture, which begins with the option at fault, else with the file of the lens.
+    fn refuse(&self, opened: &LoadedLens, error: &PictureError) -> CliError {
+        let asked = |distance: f64| self.focus == Some(distance);
+        let blamed = match error {
+            PictureError::NotImaged { distance } if asked(*distance) => "--focus",
+            PictureError::NotFocused { distance } if asked(*distance) => "--focus",
+            _ => &opened.file,
+        };
+        CliError::Input(format!("{blamed}: {error}"))
     }
 
     /// Writes the map of the error if that is asked for.
@@ -260,6 +307,10 @@ impl PictureArgs {
     ) -> Vec<OmittedEffect> {
         let frame = &rendered.picture.frame;
         let mut left_out = omitted_beside(&shot.model, frame, self.error.0, included);
+        if self.coating.is_some() && included.ghosts.is_none() {
+            let ghosts = left_out.iter_mut().find(|omitted| omitted.effect == "ghosts");
+            ghosts.into_iter().for_each(|ghosts| ghosts.reason = NO_GHOSTS);
+        }
         if let Some(colors) = rendered.colors.filter(|colors| colors.count <= 1) {
             let (effect, reason) = if colors.count == 0 {
                 (
@@ -310,6 +361,9 @@ impl PictureArgs {
         }
     }
 }
+
+/// The reason for which a picture with a coating has no ghosts, which are the last that is added to it.
+const NO_GHOSTS: &str = "not computed, since the picture was stopped";
 
 /// A lens focused for a picture, with its sensor.
 struct CameraShot {

@@ -103,13 +103,14 @@ impl PictureArgs {
         source: &SceneSource,
         stop: &AtomicBool,
     ) -> Result<(RenderedPicture, CameraShot), CliError> {
-        let refuse = |error: PictureError| CliError::Input(format!("{}: {error}", opened.file));
+        let refuse = |error: PictureError| self.refuse(opened, &error);
         let mut split = self.split();
         let shot = self.shot(opened, source, WAVELENGTH_COUNTS[USUAL]).map_err(refuse)?;
         let scene = self.scene(source, &shot).map_err(|error| match error {
             SceneFileError::Picture(error) => refuse(error),
             other => scene_error(other),
         })?;
+        let scene = self.sized(scene)?;
         let chosen = self.colors(opened, (source, &scene), shot, &mut split).map_err(refuse)?;
         let (shot, colors) = chosen;
         // What moves by less than can be seen needs no samples of the time.

@@ -121,10 +121,13 @@ impl PictureArgs {
                 file.build(model, frame, (*distance, folder))?
             }
         };
-        match self.size {
-            Some(width) => Ok(scene.with_width(width)?),
-            None => Ok(scene),
-        }
+        Ok(scene)
+    }
+
+    /// The scene as wide as it is asked for.
+    pub(super) fn sized(&self, scene: Scene) -> Result<Scene, CliError> {
+        let Some(width) = self.size else { return Ok(scene) };
+        scene.with_width(width).map_err(|error| CliError::Input(format!("--size: {error}")))
     }
 }
 

@@ -7,7 +7,8 @@ use crate::cli::error::CliError;
 use crate::files::json::read_json;
 use crate::files::{MAX_LENS_BYTES, read_file};
 use crate::picture::{
-    BuiltInScene, Exposure, MID_GREY, Picture, SensorModel, SensorPreset, photon_count,
+    BuiltInScene, Exposure, MID_GREY, Picture, PictureError, SensorModel, SensorPreset,
+    photon_count,
 };
 use serde::Deserialize;
 use std::path::Path;
@@ -168,7 +169,7 @@ impl SensorArgs {
         put(&mut model.gain, self.gain);
         put(&mut model.black_level, self.black_level);
         model.bits = self.sensor_bits.unwrap_or(model.bits);
-        model.check().map_err(|error| CliError::Input(format!("the sensor: {error}")))?;
+        model.check().map_err(|error| wrong_number(&error))?;
         if before != *model {
             sensor.source = format!("{}; changed by options", sensor.source);
         }
@@ -220,4 +221,16 @@ impl PictureArgs {
         };
         (image.develop(picture), report)
     }
+}
+
+/// The error of a number of a sensor, which begins with its option.
+fn wrong_number(error: &PictureError) -> CliError {
+    let PictureError::Size { what, found, expected } = error else {
+        return CliError::Input(format!("--sensor: {error}"));
+    };
+    let option = match *what {
+        "the number of bits" => "sensor-bits".to_owned(),
+        name => name.trim_start_matches("the ").replace(' ', "-"),
+    };
+    CliError::Input(format!("--{option}: found {found}; expected {expected}"))
 }

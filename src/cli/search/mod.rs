@@ -201,6 +201,9 @@ impl SearchArgs {
     fn landscape_error(&self, file: &str, cause: LandscapeError) -> CliError {
         let goal = self.plan_args.files().find(|(option, _)| *option == "--goal");
         match (cause, goal) {
+            (cause @ LandscapeError::Setting { what: "the number of steps of a move", .. }, _) => {
+                CliError::Input(format!("--steps: {cause}"))
+            }
             (cause @ (LandscapeError::Setting { .. } | LandscapeError::Rule(_)), _) => {
                 CliError::Input(cause.to_string())
             }
@@ -419,10 +422,12 @@ fn nothing_to_do(run: &SearchRunOn<LensLandscape>) -> Option<String> {
     })
 }
 
-/// The error of a lens for which the search is not possible.
-/// The error of settings or of a checkpoint.
+/// The error of settings, which have the names of their options, or of a checkpoint.
 fn search_error(cause: SearchError) -> CliError {
     match cause {
+        SearchError::Setting { name, found, expected } => {
+            CliError::Input(format!("--{name}: found {found}; expected {expected}"))
+        }
         SearchError::Checkpoint(CheckpointError::File(error)) => CliError::File(error),
         SearchError::Checkpoint(CheckpointError::RoundTripFailed { .. }) => {
             CliError::Failed(cause.to_string())

@@ -252,6 +252,10 @@ impl SearchPlanArgs {
             start.zoom.iter_mut().for_each(|position| position.fields = None);
         }
         if let Some(um) = positive("--wavelength", self.wavelength)? {
+            let primary = lens.wavelengths[lens.primary()].um;
+            if let (Err(why), Ok(_)) = (lens.resolve(0, um), lens.resolve(0, primary)) {
+                return Err(CliError::Input(format!("--wavelength: {why}")));
+            }
             start.wavelengths = vec![Wavelength { um, weight: 1.0, primary: true }];
         }
         Ok(self.open.map_or_else(|| start.clone(), |limit| with_open_apertures(&start, limit)))

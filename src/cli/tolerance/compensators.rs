@@ -44,25 +44,30 @@ pub(super) fn compensator_rows(analysis: &ToleranceAnalysis) -> Vec<CompensatorR
 
 /// The compensators as text: angles in minutes of arc; of the real lenses, or by the form without any.
 pub(super) fn compensator_table(rows: &[CompensatorRow]) -> TextTable {
-    let head = ["compensator", "surfaces", "travel", "as designed", "mean", "largest", "at stop"];
+    let head = [
+        "compensator",
+        "surfaces",
+        "travel",
+        "as designed",
+        "mean",
+        "standard deviation",
+        "largest",
+        "at stop",
+    ];
     let mut table = TextTable::new(&head);
     for row in rows {
         let (factor, unit) =
             if row.part.is_angle() { (60.0_f64.to_degrees(), "'") } else { (1.0, " mm") };
         let number = |value: f64| format!("{}{unit}", ShortNumber(factor * value));
         let found = row.real.unwrap_or(row.form);
-        let spread = format!(
-            "{} ± {}{unit}",
-            ShortNumber(factor * found.mean),
-            ShortNumber(factor * found.deviation)
-        );
         let place = row.part.in_lens().map_or_else(String::new, |p| surfaces(p.first, p.last));
         table.row([
             row.part.name().to_owned(),
             place,
             row.travel.map_or_else(|| "unlimited".to_owned(), number),
             number(row.nominal),
-            spread,
+            number(found.mean),
+            number(found.deviation),
             number(found.largest),
             percent(found.at_stop),
         ]);

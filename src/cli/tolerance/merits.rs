@@ -4,7 +4,7 @@ use super::ToleranceArgs;
 use super::report::ShareOfGrowth;
 use super::tables::{percent, surfaces};
 use crate::cli::output::{ShortNumber, TextTable};
-use crate::lens::{Lens, ToleranceSheet};
+use crate::lens::{Lens, TableUnit, ToleranceSheet};
 use crate::report::FurtherColumns;
 use crate::tolerance::{
     ContrastChanges, ContrastSummary, KindShare, PartShare, RealMerit, RealMeritRequest, StopTest,
@@ -148,8 +148,9 @@ impl FurtherMerits {
     }
 
     /// The further columns of the table as CSV.
-    pub(super) fn columns(&self) -> FurtherColumns {
-        let cells = self.rows.iter().map(FurtherRow::csv).collect();
+    pub(super) fn columns(&self, sheet: &ToleranceSheet) -> FurtherColumns {
+        let units = sheet.errors.iter().map(|own| own.error.kind.table_unit());
+        let cells = self.rows.iter().zip(units).map(|(row, unit)| row.csv(unit)).collect();
         FurtherColumns { heads: self.csv_head(), cells }
     }
 
@@ -157,9 +158,9 @@ impl FurtherMerits {
     fn csv_head(&self) -> String {
         let mut head = String::new();
         if self.wavefront.is_some() {
-            head += ",wavefront_fixed_first,wavefront_fixed_second,wavefront_fixed_share,\
-                     wavefront_refocused_first,wavefront_refocused_second,\
-                     wavefront_refocused_share";
+            head += ",wavefront_fixed_first (waves^2/unit),wavefront_fixed_second (waves^2/unit^2),\
+                     wavefront_fixed_share,wavefront_refocused_first (waves^2/unit),\
+                     wavefront_refocused_second (waves^2/unit^2),wavefront_refocused_share";
         }
         if self.mtf.is_some() {
             head += ",mtf_fixed_low,mtf_fixed_high,mtf_refocused_low,mtf_refocused_high";
@@ -178,11 +179,13 @@ impl FurtherRow {
         wavefront.chain(self.mtf.iter().map(worst)).collect()
     }
 
-    /// The cells of the further columns of CSV, each behind a comma.
-    fn csv(&self) -> String {
+    /// The cells of the further columns of CSV, each behind a comma, in the unit of the error.
+    fn csv(&self, TableUnit { factor, .. }: TableUnit) -> String {
         let parts = self.wavefront.iter().flat_map(|own| [&own.fixed, &own.refocused]);
-        let derivatives =
-            |part: &ShareOfGrowth| format!(",{},{},{}", part.by.first, part.by.second, part.share);
+        let derivatives = |part: &ShareOfGrowth| {
+            let (first, second) = (part.by.first / factor, part.by.second / (factor * factor));
+            format!(",{first},{second},{}", part.share)
+        };
         let changes = self.mtf.iter().flat_map(|own| [own.fixed, own.refocused]);
         let ends = |ends: Option<[f64; 2]>| {
             ends.map_or(",,".to_owned(), |[low, high]| format!(",{low},{high}"))

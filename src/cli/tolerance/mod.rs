@@ -20,10 +20,10 @@ use crate::cli::output::Output;
 use crate::cli::output_paths::OutputPaths;
 use crate::cli::progress::{note_if_stopped, stop_flag};
 use crate::files::{self, FileLock};
-use crate::lens::{Compensator, Lens, ToleranceSheet};
+use crate::lens::{Compensator, Lens, Perturbation, ToleranceSheet};
 use crate::report::tolerance_table;
 use crate::tolerance::{
-    ErrorModel, LoosestGoal, LoosestRequest, LoosestTolerances, MadeLens, RealLens,
+    ErrorModel, FocusTreatment, LoosestGoal, LoosestRequest, LoosestTolerances, MadeLens, RealLens,
     SecondDerivatives, StopTest, ToleranceAnalysis, ToleranceError, ToleranceGrade,
     ToleranceRequest, ToleranceScene, graded_sheet, refuse_lost_lenses, worst_lens,
 };
@@ -37,6 +37,7 @@ fn parse_sample_count(text: &str) -> Result<usize, &'static str> {
 /// Shows what manufacturing errors do to a lens: sensitivities, expected spot, quantiles, yield
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/tolerance.txt"))]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(super) struct ToleranceArgs {
     #[command(flatten)]
     lens: LensFile,
@@ -61,6 +62,15 @@ pub(super) struct ToleranceArgs {
     /// The zoom position, counted from 0
     #[arg(long, default_value_t = 0, value_name = "N")]
     zoom: usize,
+
+    /// The order of the errors in text, JSON and CSV: by their share of the growth of the spot when it is
+    /// refocused, or at the fixed image plane
+    #[arg(long, value_enum, default_value = "refocused", value_name = "FOCUS")]
+    sort: FocusTreatment,
+
+    /// Prints every error, and not only the twenty worst ones and the sum of the others
+    #[arg(long)]
+    all: bool,
 
     /// The largest rms spot radius of a good lens in mm: adds the yield, the share of good lenses
     #[arg(long, value_name = "MM")]
@@ -111,7 +121,7 @@ pub(super) struct ToleranceArgs {
     #[arg(long, value_name = "FILE")]
     worst: Option<PathBuf>,
 
-    /// A file for the worst errors, the distribution and the yield as a picture: PNG or SVG
+    /// A file for the worst errors, the distribution and the yield as a picture: PNG, SVG or PDF
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 }
@@ -123,7 +133,7 @@ impl ToleranceArgs {
         let opened = self.lens.open()?;
         opened.check_zoom(self.zoom)?;
         let _lock = self.checkpoint.as_deref().map(FileLock::acquire).transpose()?;
-        let refuse = |source: ToleranceError| tolerance_error(&opened, &source);
+        let refuse = |source: ToleranceError| self.error(&opened, &source);
         let stop = stop_flag();
         let stops = || stop.load(Ordering::Relaxed);
         let scene = ToleranceScene::new_until(&opened.lens, self.zoom, self.error.0, &stops);
@@ -134,14 +144,15 @@ impl ToleranceArgs {
         let analysis = self.analysis((&opened, &scene, &sheet), &stops, &mut failures)?;
         refuse_lost_lenses(analysis.lost, analysis.samples, "these tolerances").map_err(refuse)?;
         let loosest = self.loosest((&opened.lens, &scene), &analysis, (&sheet, &stops));
-        let loosest = LoosestReport::new(loosest.map_err(refuse)?);
+        let loosest =
+            LoosestReport::new(loosest.map_err(|source| self.loosest_error(&opened, &source))?);
         let further = FurtherMerits::new(self, (&opened.lens, &scene, &sheet), &stops);
         let further = further.map_err(refuse)?;
         note_if_stopped(&stop);
         let worst = self.worst(&opened, &scene, &sheet, &analysis.real).map_err(refuse)?;
         if let Some(path) = &self.csv {
-            let columns = further.columns();
-            let table = tolerance_table(&sheet, &analysis, &columns).map_err(refuse)?;
+            let columns = further.columns(&sheet);
+            let table = tolerance_table(&sheet, &analysis, &columns, self.sort).map_err(refuse)?;
             failures.note(files::write_atomic(path, table.as_bytes()));
         }
         if let Some(path) = &self.plot {
@@ -179,7 +190,7 @@ impl ToleranceArgs {
         stop: StopTest<'_>,
         failures: &mut Failures,
     ) -> Result<ToleranceAnalysis, CliError> {
-        let refuse = |source: ToleranceError| tolerance_error(opened, &source);
+        let refuse = |source: ToleranceError| self.error(opened, &source);
         let lens = Lens { tolerances: Some(sheet.clone()), ..opened.lens.clone() };
         let source = RandomLensSource::new(&lens, self.zoom, self.error.0, self.seed);
         let source = source.with_held_pupils(self.hold_pupils);
@@ -255,17 +266,38 @@ impl ToleranceArgs {
             (Some(sheet), None) => sheet.clone(),
             (_, grade) => graded_sheet(&opened.lens, &scene.lens, grade.unwrap_or_default()),
         };
+        let check = |sheet: &ToleranceSheet, blamed: &str| {
+            let with = Lens { tolerances: Some(sheet.clone()), ..opened.lens.clone() };
+            with.check().map_err(|why| CliError::Input(format!("{blamed}: {why}")))
+        };
+        check(&sheet, &opened.file)?;
         self.compensators.iter().for_each(|own| sheet.set_compensator(*own));
-        let with = Lens { tolerances: Some(sheet.clone()), ..opened.lens.clone() };
-        with.check().map_err(|why| CliError::Input(format!("{}: {why}", opened.file)))?;
+        check(&sheet, "--compensator")?;
         Ok(sheet)
     }
-}
 
-fn tolerance_error(opened: &LoadedLens, source: &ToleranceError) -> CliError {
-    let text = format!("{}: {source}", opened.file);
-    match source {
-        ToleranceError::MostLost { .. } | ToleranceError::Stopped => CliError::Failed(text),
-        _ => CliError::Input(text),
+    /// The error of the loosest tolerances: a spot that no tolerances give is one of the option.
+    fn loosest_error(&self, opened: &LoadedLens, source: &ToleranceError) -> CliError {
+        let option = if self.loosest.is_some() { "--loosest" } else { "--rms" };
+        match source {
+            ToleranceError::BelowNominal { .. } => CliError::Input(format!("{option}: {source}")),
+            other => self.error(opened, other),
+        }
+    }
+
+    /// The error of an analysis, which names the option where a compensator that was asked for is at fault.
+    fn error(&self, opened: &LoadedLens, source: &ToleranceError) -> CliError {
+        let is_own = |what: &Perturbation| {
+            self.compensators.iter().any(|own| own.part.in_lens().as_ref() == Some(what))
+        };
+        let blamed = match source {
+            ToleranceError::NotPossible { what, .. } if is_own(what) => "--compensator",
+            _ => &opened.file,
+        };
+        let text = format!("{blamed}: {source}");
+        match source {
+            ToleranceError::MostLost { .. } | ToleranceError::Stopped => CliError::Failed(text),
+            _ => CliError::Input(text),
+        }
     }
 }

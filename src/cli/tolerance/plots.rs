@@ -9,7 +9,7 @@ use crate::tolerance::ToleranceAnalysis;
 use std::path::Path;
 
 /// The extensions of the files that can be written.
-pub(super) const EXTENSIONS: [&str; 2] = ["png", "svg"];
+pub(super) const EXTENSIONS: [&str; 3] = ["png", "svg", "pdf"];
 
 /// Draws the results into a file.
 pub(super) fn save(

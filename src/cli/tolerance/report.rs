@@ -8,8 +8,8 @@ use super::power::PowerUnits;
 use crate::cli::output::ShortNumber;
 use crate::lens::{Lens, PerturbationKind, ToleranceSheet};
 use crate::tolerance::{
-    AsBuiltSpot, Derivatives, MadeLens, NominalLens, PupilMotion, StoppedLenses, ToleranceAnalysis,
-    ToleranceError, ToleranceScene,
+    AsBuiltSpot, Derivatives, FocusTreatment, MadeLens, NominalLens, PupilMotion, StoppedLenses,
+    ToleranceAnalysis, ToleranceError, ToleranceScene,
 };
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -32,6 +32,9 @@ pub(super) struct ToleranceReport {
     stopped: Option<StoppedLenses>,
     second_derivatives: bool,
     pub(super) sensitivities: Vec<SensitivityRow>,
+    /// True if the text has every error, and not only the worst ones.
+    #[serde(skip)]
+    pub(super) shows_all: bool,
     groups: GroupedShares,
     #[serde(flatten)]
     pub(super) further: FurtherMerits,
@@ -109,7 +112,11 @@ impl ToleranceReport {
             clipping: analysis.clipping,
             pupils: analysis.pupils.clone(),
             second_derivatives: analysis.has_second_derivatives,
-            sensitivities: rows(sheet, &analysis, (&shares, &mut further), &scene.lens),
+            sensitivities: sorted(
+                rows(sheet, &analysis, (&shares, &mut further), &scene.lens),
+                arguments.sort,
+            ),
+            shows_all: arguments.all,
             groups: GroupedShares::new(lens, sheet, &shares),
             compensators: compensator_rows(&analysis),
             stopped: analysis.stopped,
@@ -122,7 +129,17 @@ impl ToleranceReport {
     }
 }
 
-/// The sensitivities, sorted by their share after refocusing.
+/// The sensitivities, that with the largest share first.
+fn sorted(mut rows: Vec<SensitivityRow>, order: FocusTreatment) -> Vec<SensitivityRow> {
+    let share = |row: &SensitivityRow| match order {
+        FocusTreatment::Fixed => row.fixed.share,
+        FocusTreatment::Refocused => row.refocused.share,
+    };
+    rows.sort_by(|a, b| share(b).total_cmp(&share(a)));
+    rows
+}
+
+/// The sensitivities, in the order of the errors.
 fn rows(
     sheet: &ToleranceSheet,
     analysis: &ToleranceAnalysis,
@@ -130,29 +147,26 @@ fn rows(
     lens: &NominalLens,
 ) -> Vec<SensitivityRow> {
     let both = sheet.errors.iter().zip(shares.iter().copied()).enumerate();
-    let mut rows: Vec<SensitivityRow> = both
-        .map(|(i, (tolerance, [fixed, refocused]))| {
-            let [by_fixed, by_adjusted] = analysis.forms.each_ref().map(|form| Derivatives {
-                value: form.nominal,
-                first: form.first[i],
-                second: form.second.of(i, i),
-            });
-            let sigma = tolerance.deviation();
-            SensitivityRow {
-                kind: tolerance.error.kind,
-                first: tolerance.error.first,
-                last: tolerance.error.last,
-                half_range: tolerance.half_range,
-                power: PowerUnits::new(tolerance, lens),
-                sigma,
-                fixed: ShareOfGrowth { by: by_fixed, share: fixed },
-                refocused: ShareOfGrowth { by: by_adjusted, share: refocused },
-                further: further.row(i),
-            }
-        })
-        .collect();
-    rows.sort_by(|a, b| b.refocused.share.total_cmp(&a.refocused.share));
-    rows
+    both.map(|(i, (tolerance, [fixed, refocused]))| {
+        let [by_fixed, by_adjusted] = analysis.forms.each_ref().map(|form| Derivatives {
+            value: form.nominal,
+            first: form.first[i],
+            second: form.second.of(i, i),
+        });
+        let sigma = tolerance.deviation();
+        SensitivityRow {
+            kind: tolerance.error.kind,
+            first: tolerance.error.first,
+            last: tolerance.error.last,
+            half_range: tolerance.half_range,
+            power: PowerUnits::new(tolerance, lens),
+            sigma,
+            fixed: ShareOfGrowth { by: by_fixed, share: fixed },
+            refocused: ShareOfGrowth { by: by_adjusted, share: refocused },
+            further: further.row(i),
+        }
+    })
+    .collect()
 }
 
 fn warnings(analysis: &ToleranceAnalysis) -> Vec<String> {

@@ -40,7 +40,8 @@ impl ToleranceReport {
         let mut head = vec!["error", "surfaces", "half range", "share fixed", "share refocused"];
         head.extend(self.further.heads());
         let mut table = TextTable::new(&head);
-        for row in self.sensitivities.iter().take(SHOWN) {
+        let shown = if self.shows_all { self.sensitivities.len() } else { SHOWN };
+        for row in self.sensitivities.iter().take(shown) {
             let own = [
                 row.kind.name().to_owned(),
                 surfaces(row.first, row.last),
@@ -53,14 +54,15 @@ impl ToleranceReport {
             ];
             table.row(own.into_iter().chain(row.further.cells()));
         }
-        let more = self.sensitivities.len().saturating_sub(SHOWN);
+        let more = self.sensitivities.len().saturating_sub(shown);
         if more > 0 {
             let rest = |of: fn(&SensitivityRow) -> f64| {
-                self.sensitivities[SHOWN..].iter().map(of).sum::<f64>()
+                self.sensitivities[shown..].iter().map(of).sum::<f64>()
             };
             let shares = [rest(|row| row.fixed.share), rest(|row| row.refocused.share)];
             let [fixed, refocused] = shares.map(percent);
-            let own = [format!("{more} more"), String::new(), String::new(), fixed, refocused];
+            let own =
+                [format!("{more} more (--all)"), String::new(), String::new(), fixed, refocused];
             let none = self.further.heads().into_iter().map(|_| String::new());
             table.row(own.into_iter().chain(none));
         }

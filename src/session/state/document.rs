@@ -16,6 +16,7 @@ use crate::session::history::{DesignHistory, VersionOrigin};
 use crate::session::journal::JournalEntry;
 use crate::session::proposal::MeritProposal;
 use crate::session::view::Severity;
+use crate::tolerance::FocusTreatment;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -285,8 +286,9 @@ impl Session {
         let made = made.value.as_ref().map_err(Clone::clone)?;
         let (sheet, analysis) = (&made.sheet, &made.analysis);
         if kind == PaperKind::ToleranceTable {
-            let table = tolerance_table(sheet, analysis, &FurtherColumns::default())
-                .map_err(|why| why.to_string())?;
+            let (further, order) = (FurtherColumns::default(), FocusTreatment::Refocused);
+            let table =
+                tolerance_table(sheet, analysis, &further, order).map_err(|why| why.to_string())?;
             return Ok(table.into_bytes());
         }
         let charts = tolerance_sheet(&self.lens.name, sheet, analysis);

@@ -286,7 +286,10 @@ fn compensators_are_read_shown_and_refused() {
     for (option, words) in [
         ("index@1=0.1", "expected KIND=TRAVEL"),
         ("sensor_tilt_x@1=0.1", "neither"),
-        ("thickness@9=0.1", "names surfaces 9 to 9"),
+        (
+            "thickness@9=0.1",
+            "error: --compensator: the compensator `thickness` names surfaces 9 to 9",
+        ),
         ("thickness@1-2=0.1", "expected one of 1 to 2"),
         ("focus=-1", "travel of the focus"),
         ("thickness@1=-1", "travel of the compensator"),
