@@ -303,6 +303,7 @@ mod tests {
         let strehl = Strehl {
             at_chief: spread.strehl,
             best: Estimate::new(0.6, 0.5, 400),
+            is_brightest: true,
             best_at: [0.0; 3],
             reached: true,
         };
