@@ -26,6 +26,13 @@ pub struct Strehl {
     pub reached: bool,
 }
 
+impl Strehl {
+    /// The name of the largest intensity: "best", or "locally best" if not all of the blur was looked at.
+    pub fn best_name(&self) -> &'static str {
+        if self.is_brightest { "best" } else { "locally best" }
+    }
+}
+
 /// The Strehl ratios of a field at a wavelength; errors are absolute. The error of the best one counts
 /// the quadrature; `is_brightest` tells if all of the blur was looked at.
 ///

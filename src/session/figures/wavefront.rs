@@ -155,8 +155,9 @@ pub(super) fn point_spread(subject: &Subject<'_>) -> Option<AnalysisFigure> {
                     &image.strehl.at_chief,
                     "",
                 ));
+                let best = image.strehl.best_name();
                 notes.push(estimate_note(
-                    &format!("{name} best Strehl ratio"),
+                    &format!("{name} {best} Strehl ratio"),
                     &image.strehl.best,
                     "",
                 ));

@@ -450,7 +450,7 @@ fn image_lines(image: &PointImage) -> Vec<String> {
     let width = number::format_digits(2e3 * image.intensity.half_width, 3);
     vec![
         format!("Strehl {}", estimate_text(image.strehl.at_chief, "")),
-        format!("best {}", estimate_text(image.strehl.best, "")),
+        format!("{} {}", image.strehl.best_name(), estimate_text(image.strehl.best, "")),
         format!("{width} µm wide, intensity {}", plain_error(image.error, "")),
     ]
 }
