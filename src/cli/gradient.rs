@@ -95,7 +95,7 @@ impl GradientArgs {
         let opened = self.lens.open()?;
         opened.check_zoom(self.zoom)?;
         let blamed = opened.blame_field(self.field, self.zoom);
-        let refuse = |source| CliError::RayModel { file: blamed.clone(), source };
+        let refuse = |source| CliError::RayModel { file: opened.file.clone(), source };
         let mut lens = self.selected_lens(&opened)?;
         if let Some(why) = lens.stop().and_then(|stop| lens.surfaces[stop].stop_fault()) {
             return Err(CliError::Input(format!("{}: {why}", opened.file)));
@@ -106,14 +106,12 @@ impl GradientArgs {
         remove_omitted(&mut lens, &plan);
         lens.surfaces[model.stop()].semi_diameter = Some(model.stop_radius());
         let (found, ms) = time_ms(|| self.differentiate(&model));
-        let found = found.map_err(|cause| {
-            let text = format!("{blamed}: {cause}");
-            match cause {
-                DerivativeError::Dark(..)
-                | DerivativeError::Launch(_)
-                | DerivativeError::Unbounded => CliError::Input(text),
-                _ => CliError::Failed(text),
+        let found = found.map_err(|cause| match cause {
+            DerivativeError::Dark(..) => CliError::Input(format!("{blamed}: {cause}")),
+            DerivativeError::Launch(_) | DerivativeError::Unbounded => {
+                CliError::Input(format!("{}: {cause}", opened.file))
             }
+            _ => CliError::Failed(format!("{}: {cause}", opened.file)),
         })?;
         if found.least_rays > self.rays {
             return Err(CliError::Input(format!(

@@ -33,6 +33,11 @@ impl LensFiles {
         Self { paths }
     }
 
+    /// The number of files.
+    pub(super) const fn count(&self) -> usize {
+        self.paths.len()
+    }
+
     /// Measures every lens, and makes a row of its file and what was found; a bar counts them, and
     /// a request to end leaves out those that have not begun. The second argument of `measure` is
     /// the name of the file without its ending, the third is true once it is asked to end; a lens

@@ -89,7 +89,7 @@ pub(super) fn styled_bar(steps: usize, template: &str) -> ProgressBar {
 #[derive(Debug)]
 pub(super) struct ProgressNotes {
     clock: Stopwatch,
-    /// The seconds at which the next line is due, and those from it to the one after.
+    /// The seconds at which the next line is due, and those from the line before to it.
     due: f64,
     pause: f64,
 }

@@ -33,7 +33,7 @@ pub struct GlassGain {
     pub merit_random: Option<f64>,
 }
 
-/// What of a measurement is going on.
+/// A part of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GlassPhase {
     /// The descent with the glasses of the lens.
@@ -44,10 +44,10 @@ pub enum GlassPhase {
     Random,
 }
 
-/// Where a measurement is.
+/// The state of a measurement that goes on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GlassProgress {
-    /// What is going on.
+    /// The part.
     pub phase: GlassPhase,
     /// The evaluations of it so far.
     pub evaluations: usize,
@@ -62,7 +62,7 @@ type GlassWatch<'a> = dyn FnMut(GlassProgress) -> ControlFlow<()> + 'a;
 
 /// Optimizes a lens, then exchanges its glasses for any of the catalogue, in an order by a seed, until nothing
 /// gains or `most` evaluations are used. A lens without a goal gets the default one, a lens without variables all
-/// curvatures and thicknesses. Ended by `watch`, it gives what was found so far; `None` if no glass was exchanged.
+/// curvatures and thicknesses. Ended by `watch`, it gives what was found so far; `None` before the exchange began.
 ///
 /// # Errors
 /// A lens without glasses to exchange, or without a merit.
@@ -78,15 +78,13 @@ pub fn measure_glass_gain(
     let merit_before = search.merit();
     let Some(lens) = descended(&first, &goal, tolerance, watch)? else { return Ok(None) };
     search.restart(&lens)?;
-    let clock = Stopwatch::start();
     let merit_optimized = search.merit();
     let guided = exchange(&mut search, (GlassPhase::Guided, most), watch)?;
-    let seconds = clock.seconds();
     let mut random = GlassSearch::new(&first, &goal, tolerance, glass::catalogue(), seed)?;
     random = random.without_predictions();
     random.restart(&lens)?;
     let limit = (GlassPhase::Random, Some(guided.evaluations));
-    let merit_random = if guided.is_ended_early {
+    let merit_random = if guided.is_ended_early || guided.evaluations == 0 {
         None
     } else {
         let found = exchange(&mut random, limit, watch)?;
@@ -98,7 +96,7 @@ pub fn measure_glass_gain(
         merit: guided.merit,
         exchanges: guided.exchanges,
         evaluations: guided.evaluations,
-        seconds,
+        seconds: guided.seconds,
         finished: guided.is_finished,
         merit_random,
     }))
@@ -132,6 +130,8 @@ struct ExchangeEnd {
     merit: f64,
     exchanges: usize,
     evaluations: usize,
+    /// The time of the rounds that count.
+    seconds: f64,
     /// True if nothing further gains.
     is_finished: bool,
     /// True if `watch` ended it.
@@ -145,10 +145,12 @@ fn exchange(
     (phase, most): (GlassPhase, Option<usize>),
     watch: &mut GlassWatch<'_>,
 ) -> Result<ExchangeEnd, GlassSearchError> {
+    let clock = Stopwatch::start();
     let mut end = ExchangeEnd {
         merit: search.merit(),
         exchanges: 0,
         evaluations: 0,
+        seconds: 0.0,
         is_finished: false,
         is_ended_early: false,
     };
@@ -160,6 +162,7 @@ fn exchange(
         end.merit = round.merit;
         end.exchanges += usize::from(round.accepted.is_some());
         end.evaluations = round.evaluations;
+        end.seconds = clock.seconds();
         let ExchangeEnd { merit, exchanges, evaluations, .. } = end;
         if phase == GlassPhase::Guided && round.finished {
             return Ok(ExchangeEnd { is_finished: true, ..end });

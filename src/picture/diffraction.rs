@@ -47,6 +47,22 @@ pub struct DiffractionReport {
 }
 
 impl DiffractionReport {
+    /// Diffraction that is left out, by a bound of the change of contrast up to a frequency.
+    fn off(bound: f64, frequency: f64, reason: &'static str) -> Self {
+        Self {
+            on: false,
+            aberrated: false,
+            variation: 0.0,
+            change: bound,
+            left: bound,
+            cut: 0.0,
+            frequency,
+            points: 0,
+            without_aberrations: None,
+            reason,
+        }
+    }
+
     /// The error of a picture as a share of mid grey, given its mean in units of that: contrast that is left
     /// changes mid grey by its share at most, and light that is cut off is missing from all of the picture.
     pub fn error(&self, mean_over_grey: f64) -> f64 {
@@ -92,18 +108,7 @@ impl DiffractionLight {
         let cutoff = 1.0 / (wavelength * f_number);
         let frequency = (0.5 / frame.pitch).min(cutoff);
         let bound = (LARGEST_CHANGE * frequency / cutoff).min(1.0);
-        let without = |reason| DiffractionReport {
-            on: false,
-            aberrated: false,
-            variation: 0.0,
-            change: bound,
-            left: bound,
-            cut: 0.0,
-            frequency,
-            points: 0,
-            reason,
-            without_aberrations: None,
-        };
+        let without = |reason| DiffractionReport::off(bound, frequency, reason);
         let off = |reason| Ok(Self { report: without(reason), parts: None });
         if bound <= tolerance {
             return off("at most 1.27 nu lambda F of contrast");
@@ -125,11 +130,12 @@ impl DiffractionLight {
         let change = contrasts.largest(PlaceContrast::change);
         let matters = change > tolerance;
         let lens = AberratedLens { model, bands, directions: &directions, scene };
-        let trial = contrasts.aberrated(&spreads, &lens, (reach, tolerance), matters);
         let left = contrasts.largest(|place| place.left(&spreads, true));
+        let trial = contrasts.aberrated((&spreads, left), &lens, (reach, tolerance), matters);
         let (mut spreads, left, refused) = match trial {
-            Ok((own, less)) => (own, less, None),
-            Err(why) => (spreads, left, why),
+            AberratedTrial::Better(own, less) => (own, less, None),
+            AberratedTrial::NotNeeded => (spreads, left, None),
+            AberratedTrial::Refused(why) => (spreads, left, Some(why)),
         };
         let on = matters && left < change;
         let aberrated = on && spreads.aimed.is_some();
@@ -142,7 +148,7 @@ impl DiffractionLight {
             cut: if on { spreads.cut(longest) } else { 0.0 },
             points: contrasts.0.len(),
             reason: if aberrated { ABERRATED } else { reason([on, matters, left > tolerance]) },
-            without_aberrations: refused,
+            without_aberrations: refused.filter(|_| on),
             ..without("")
         };
         spreads.is_even = report.variation <= tolerance;
@@ -185,28 +191,42 @@ impl Contrasts {
         self.0.iter().map(error).fold(0.0, f64::max)
     }
 
-    /// The spreads of pupils with their aberrations and what they leave, if they matter and leave less than those
-    /// of pupils alone; else the reason why not, if pupils alone are not good enough.
+    /// The spreads of pupils with their aberrations, if those of pupils alone leave too much.
     fn aberrated(
         &self,
-        plain: &PupilSpreads,
+        (plain, left): (&PupilSpreads, f64),
         lens: &AberratedLens<'_>,
         (reach, tolerance): (f64, f64),
         matters: bool,
-    ) -> Result<(PupilSpreads, f64), Option<&'static str>> {
-        let left = self.largest(|place| place.left(plain, true));
+    ) -> AberratedTrial {
         if !matters || left <= tolerance {
-            return Err(None);
+            return AberratedTrial::NotNeeded;
         }
         if !lens.scene.is_at_one_distance() {
-            return Err(Some("the scene is not at one distance"));
+            return AberratedTrial::Refused("the scene is not at one distance");
         }
-        let own = lens.spreads(reach, plain.margin);
-        let own =
-            own.ok_or(Some("a chief ray is lost, or they turn the phase too fast for a table"))?;
+        let Some(own) = lens.spreads(reach, plain.margin) else {
+            return AberratedTrial::Refused(
+                "a chief ray is lost, or the wavefront is too steep for the table of spreads",
+            );
+        };
         let less = self.largest(|place| place.left(&own, false));
-        if less < left { Ok((own, less)) } else { Err(Some("they would leave no less")) }
+        if less < left {
+            AberratedTrial::Better(own, less)
+        } else {
+            AberratedTrial::Refused("a spread with aberrations would be no nearer")
+        }
     }
+}
+
+/// The spread of pupils with their aberrations, tried in place of that of pupils alone.
+enum AberratedTrial {
+    /// Pupils alone are good enough.
+    NotNeeded,
+    /// The spreads, and what they leave.
+    Better(PupilSpreads, f64),
+    /// The reason why pupils alone are taken.
+    Refused(&'static str),
 }
 
 /// The reason for a spread with aberrations.

@@ -82,7 +82,7 @@ pub enum ToleranceError {
     },
     /// Tolerances are asked for with which lenses are better than the one without errors.
     #[error(
-        "found {found} mm; expected more than {nominal:.6} mm, the rms of the lens without errors"
+        "an rms of {found} mm is asked for; expected more than {nominal:.6} mm, that of the lens without errors"
     )]
     BelowNominal {
         /// The rms spot radius that is asked for in mm.

@@ -183,6 +183,15 @@ fn drawn_contrast_and_images_have_all_of_their_range() {
     let left = starts.iter().copied().fold(f64::INFINITY, f64::min);
     let at_axis = starts.iter().filter(|x| (**x - left).abs() < 1e-6).count();
     assert!(at_axis >= 5, "{starts:?}");
+    // A line over a wide gap would look like contrast.
+    let begins_late = drawn(&["mtf", "--frequencies", "40,50"]);
+    let starts: Vec<f64> =
+        begins_late.lines().filter(|line| line.contains("polyline")).filter_map(first).collect();
+    assert!(starts.iter().filter(|x| **x > left + 1.0).count() >= 2, "{starts:?}");
+    let narrow = drawn(&["psf", "--reach", "20"]);
+    let usual = drawn(&["psf"]);
+    assert!(narrow.contains("curves ±") && narrow.contains(">20<"), "{narrow}");
+    assert!(!usual.contains(">20<"), "{usual}");
     refused(2, &["analyze", SINGLET, "psf", "--reach", "5"], "", &["--plot"]);
     let wrong = ["analyze", SINGLET, "psf", "--plot", svg.path(), "--reach", "-5"];
     refused(2, &wrong, "", &["error: --reach: found -5; expected um"]);

@@ -166,8 +166,7 @@ fn with_catalogue_glass(mut lens: Lens) -> Lens {
     lens
 }
 
-/// An optimizer moves the focus of a triplet with temperature to what is asked for, at one wavelength, with its
-/// focal length kept.
+/// An optimizer moves the focus of a triplet with temperature to what is asked for, at one wavelength.
 #[test]
 fn an_optimizer_keeps_a_limit_of_thermal_focus() {
     let mut lens = with_catalogue_glass(bundled("cooke_triplet_100_f27"));

@@ -15,6 +15,7 @@
 //! polynomials leave more than the tolerance, each node of that integral has a ray of its own.
 //! Light is a scalar here, which is not enough beyond a numerical aperture of about 0.6.
 
+mod blur;
 mod brightest;
 mod column_sum;
 mod contrast;

@@ -49,6 +49,26 @@ impl PupilSamples {
         reach: Option<f64>,
         accuracy: Accuracy,
         interrupted: &Interruption<'_>,
+        numbers: impl FnMut(&Self) -> Result<Vec<f64>, AnalysisError>,
+    ) -> Result<ConvergedList, AnalysisError> {
+        let least = |few: &Self| {
+            let turns = reach.map_or(0.0, |reach| few.turns(reach));
+            (NODES_PER_TURN * turns).ceil() as usize
+        };
+        Self::converge_from(region, sphere, least, accuracy, interrupted, numbers)
+    }
+
+    /// The same from the order on that has a number of nodes along a radius, which may depend on the light of few
+    /// rays.
+    ///
+    /// # Errors
+    /// The same.
+    pub(super) fn converge_from(
+        region: &Region<'_>,
+        sphere: &ReferenceSphere,
+        least: impl FnOnce(&Self) -> usize,
+        accuracy: Accuracy,
+        interrupted: &Interruption<'_>,
         mut numbers: impl FnMut(&Self) -> Result<Vec<f64>, AnalysisError>,
     ) -> Result<ConvergedList, AnalysisError> {
         // A pupil that folds does so for few rays already.
@@ -67,8 +87,7 @@ impl PupilSamples {
                 None
             }
         };
-        let turns = reach.map_or(0.0, |reach| few.turns(reach));
-        let least = (NODES_PER_TURN * turns).ceil() as usize;
+        let least = least(&few);
         let ones = |list: &[f64]| vec![1.0; list.len()];
         let found = converge_resolved(region, accuracy, least, at_nodes, ones);
         match refused.filter(|why| *why != AnalysisError::NoLight) {

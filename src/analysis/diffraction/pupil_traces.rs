@@ -55,21 +55,17 @@ impl TracedLight {
     /// The ends of the rays of some of its nodes, given in their order, each with its path from the object.
     pub(super) fn ends_of(&self, points: &[[f64; 2]]) -> Vec<(Ray<f64>, f64)> {
         let mut wanted = points.iter().peekable();
+        let value = |node: &TracedNode| {
+            let Ray { point, direction } = node.ray;
+            (Ray { point: point.value(), direction: direction.value() }, node.path.value)
+        };
         let mut ends = Vec::with_capacity(points.len());
-        for (node, line) in self.rays.iter().zip(self.lines()) {
+        for node in &self.rays {
             if wanted.next_if(|point| **point == node.point).is_some() {
-                ends.push((line, node.path.value));
+                ends.push(value(node));
             }
         }
         ends
-    }
-
-    /// The rays at the image.
-    pub(super) fn lines(&self) -> impl Iterator<Item = Ray<f64>> + '_ {
-        self.rays.iter().map(|node| {
-            let Ray { point, direction } = node.ray;
-            Ray { point: point.value(), direction: direction.value() }
-        })
     }
 
     /// The light on a reference sphere.

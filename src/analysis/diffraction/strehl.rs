@@ -1,6 +1,7 @@
 //! The Strehl ratio: at the image point of the chief ray, and at the brightest point in space.
 
-use super::brightest::{BlurPeaks, brightest};
+use super::blur::BlurPeaks;
+use super::brightest::brightest;
 use super::pupil_samples::PupilSamples;
 use super::{Interruption, never};
 use crate::analysis::reference_sphere::ReferenceSphere;
@@ -19,7 +20,7 @@ pub struct Strehl {
     /// The position of that point from the image point of the chief ray: x, y and along the axis, in
     /// mm.
     pub best_at: [f64; 3],
-    /// True if no point of the blur is brighter: all of it was looked at. False if it is too large for
+    /// True if all of the blur was searched, and no brighter point was found. False if it is too large for
     /// that, and the best point is only brighter than those around it.
     pub is_brightest: bool,
     /// True if the tolerance was reached.
@@ -47,7 +48,7 @@ pub fn strehl(
     strehl_unless(model, field, wavelength, accuracy, &never)
 }
 
-/// The same unless it is interrupted, which is asked for before every order of the quadrature.
+/// The same unless it is interrupted, which is asked for before every order of the quadrature and in the search.
 ///
 /// # Errors
 /// The same, and [`AnalysisError::Interrupted`].
@@ -60,15 +61,18 @@ pub fn strehl_unless(
 ) -> Result<Strehl, AnalysisError> {
     let region = lit_region(model, field, wavelength)?;
     let sphere = ReferenceSphere::for_region(&region)?;
-    let peaks = BlurPeaks::find(&region, &sphere, interrupted)?;
+    let peaks = BlurPeaks::find(&region, &sphere, accuracy, interrupted)?;
     let mut best_at = [0.0; 3];
     let ratios = |light: &PupilSamples| {
         best_at = brightest(light, &peaks.points);
         Ok(vec![light.intensity([0.0; 2]), light.intensity_at(best_at)])
     };
-    let found = PupilSamples::converge(&region, &sphere, None, accuracy, interrupted, ratios)?;
+    let least = |_: &PupilSamples| peaks.nodes;
+    let found =
+        PupilSamples::converge_from(&region, &sphere, least, accuracy, interrupted, ratios)?;
     best_at[2] *= sphere.direction.z.signum();
-    let estimate = |k: usize| Estimate::new(found.values[k], found.errors[k], found.rays);
+    let rays = found.rays + peaks.rays;
+    let estimate = |k: usize| Estimate::new(found.values[k], found.errors[k], rays);
     Ok(Strehl {
         at_chief: estimate(0),
         best: estimate(1),

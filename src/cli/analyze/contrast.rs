@@ -164,9 +164,14 @@ impl TextLines for MtfJson {
     }
 }
 
-/// A curve of contrast that begins at frequency 0, where it is 1.
+/// A curve of contrast that begins at frequency 0, where it is 1, unless its first frequency is farther from there
+/// than from the second one: a line over a wide gap would look like contrast.
 fn from_zero(mut curve: ChartCurve) -> ChartCurve {
-    if let Some(first) = curve.pieces.first_mut().filter(|piece| piece[0][0] > 0.0) {
+    let is_near = |piece: &&mut Vec<[f64; 2]>| match piece[..] {
+        [[first, _], [second, _], ..] => first > 0.0 && first <= second - first,
+        _ => false,
+    };
+    if let Some(first) = curve.pieces.first_mut().filter(is_near) {
         first.insert(0, [0.0, 1.0]);
     }
     curve

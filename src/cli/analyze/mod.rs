@@ -471,7 +471,7 @@ impl AnalysisRun {
         let extra = chosen.filter(|field| !listed.contains(field));
         let all: Vec<FieldPoint> = listed.iter().copied().chain(extra).collect();
         let blamed = opened.blame_field(analyze.field, zoom);
-        let refuse = |source| CliError::RayModel { file: blamed.clone(), source };
+        let refuse = |source| CliError::RayModel { file: opened.file.clone(), source };
         let measured = effects::measure_effects_at(&opened.lens, zoom, &all).map_err(refuse)?;
         let plan = choices.plan(&measured, what.purpose(analyze.error.0));
         let model = effects::build_ray_model_at(&opened.lens, zoom, &all, &plan).map_err(refuse)?;
@@ -543,7 +543,7 @@ impl AnalysisRun {
         if reason.is_loss_of_light() {
             return self.no_light(reason);
         }
-        CliError::Input(format!("{}: {reason}", self.blamed))
+        CliError::Input(format!("{}: {reason}", self.opened.file))
     }
 
     /// The error that there is no light, with the surface where most of it is lost.

@@ -29,7 +29,7 @@ pub(super) struct PointSpreadJson {
     rounding: f64,
     /// The intensities along x and along y, if they are drawn.
     #[serde(skip)]
-    profiles: [Vec<[f64; 2]>; 2],
+    profiles: Profiles,
 }
 
 /// The intensity at a point, in mm from the image point of the chief ray.
@@ -78,6 +78,16 @@ pub(super) fn point_spreads(run: &AnalysisRun) -> Vec<AtField<PointSpreadJson>> 
     run.fields.iter().map(at).collect()
 }
 
+/// Intensities that are drawn.
+#[derive(Debug, Default)]
+struct Profiles {
+    /// Along x and along y through the image point of the chief ray, over the distance in micrometres.
+    curves: [Vec<[f64; 2]>; 2],
+    /// The largest error, and the rays.
+    error: f64,
+    rays: usize,
+}
+
 /// The points of a drawn profile for each λF, and their least and largest number on each side of its centre.
 const DRAWN: f64 = 8.0;
 const DRAWN_POINTS: [f64; 2] = [40.0, 200.0];
@@ -108,9 +118,8 @@ fn circle_of_rays(run: &AnalysisRun, field: &SelectedField) -> Option<f64> {
     distances.get(inside.saturating_sub(1)).copied().filter(|radius| radius.is_finite())
 }
 
-/// The intensities along x and along y through the image point of the chief ray, over the distance in
-/// micrometres.
-fn profiles(run: &AnalysisRun, field: &SelectedField) -> [Vec<[f64; 2]>; 2] {
+/// The profiles of a field; none where its image is not known.
+fn profiles(run: &AnalysisRun, field: &SelectedField) -> Profiles {
     let reach = run
         .reach
         .unwrap_or_else(|| circle_of_rays(run, field).unwrap_or(0.0).max(LEAST_REACH * unit(run)));
@@ -126,7 +135,8 @@ fn profiles(run: &AnalysisRun, field: &SelectedField) -> [Vec<[f64; 2]>; 2] {
     let drawn = points.iter().zip(&found.intensities);
     let drawn: Vec<_> = drawn.map(|(at, e)| [1e3 * (at[0] + at[1]), e.value]).collect();
     let (x, y) = drawn.split_at(drawn.len() / 2);
-    [x.to_vec(), y.to_vec()]
+    let error = found.intensities.iter().map(|intensity| intensity.error).fold(0.0, f64::max);
+    Profiles { curves: [x.to_vec(), y.to_vec()], error, rays: found.strehl.rays }
 }
 
 fn keys(spread: &PointSpread, strehl: Strehl, points: &[[f64; 2]], ms: f64) -> PointSpreadJson {
@@ -201,10 +211,13 @@ impl TextLines for PointSpreadJson {
     fn charts(&self) -> Vec<CurveChart> {
         let chart = |title: &str, axis: &'static str, number: fn(f64) -> Option<f64>| {
             let curve = |(i, name): (usize, &str)| {
-                let points = self.profiles[i].iter().map(|[at, value]| (*at, number(*value)));
+                let points =
+                    self.profiles.curves[i].iter().map(|[at, value]| (*at, number(*value)));
                 ChartCurve::new(name, i, points)
             };
             let curves = ["along x", "along y"].into_iter().enumerate().map(curve).collect();
+            let Profiles { error, rays, .. } = &self.profiles;
+            let title = format!("{title}, curves ± {error:.0e} by {}", counted(*rays, "ray"));
             CurveChart::new(title, ["distance, um", axis], curves)
         };
         let logarithm = |value: f64| (value > DARK).then(|| value.log10());

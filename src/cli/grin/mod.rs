@@ -79,7 +79,7 @@ impl GrinArgs {
             self.lines.then(|| StraightRaySolver::new(source_name(name), &task)).transpose()?;
         let mut runner = GrinOptimizer::new(&task).map_err(refuse)?;
         let (clock, before) = (Stopwatch::start(), processor_ms());
-        let mut worked = Ok(GrinEnd::Converged);
+        let mut worked = Ok(GrinEnd::Finished);
         let stop = stop_flag();
         let memory = peak_megabytes(|| worked = self.search(&mut runner, clock, &stop));
         let end =
@@ -217,7 +217,7 @@ impl GrinArgs {
             bar.set_message(format!("{} nodes, loss {:.2e}{unit}", progress.nodes, progress.loss));
             if progress.finished {
                 bar.finish_and_clear();
-                return Ok(GrinEnd::Converged);
+                return Ok(GrinEnd::Finished);
             }
         }
     }

@@ -26,8 +26,8 @@ pub(super) struct GrinCostSummary {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum GrinEnd {
-    /// All levels were done.
-    Converged,
+    /// All levels were done, until they converged or by all of their steps.
+    Finished,
     /// `--iterations` were made.
     IterationLimit,
     /// `--minutes` were over.
@@ -40,7 +40,7 @@ impl GrinEnd {
     /// The end as it follows the cost.
     const fn words(self) -> &'static str {
         match self {
-            Self::Converged => "",
+            Self::Finished => "",
             Self::IterationLimit => ", iteration limit reached",
             Self::TimeLimit => ", time limit reached",
             Self::Stopped => ", stopped",
@@ -219,7 +219,7 @@ impl GrinReport {
         let (integrator, step) = runner.tracing();
         Ok(Self {
             name: task.name.clone(),
-            stopped: cost.end != GrinEnd::Converged,
+            stopped: cost.end != GrinEnd::Finished,
             end: cost.end,
             loss_unit: loss_unit(&task.views),
             loss,
@@ -349,7 +349,7 @@ mod tests {
     #[test]
     fn a_search_that_ended_by_itself_was_not_stopped() {
         let words =
-            [GrinEnd::Converged, GrinEnd::IterationLimit, GrinEnd::TimeLimit].map(GrinEnd::words);
+            [GrinEnd::Finished, GrinEnd::IterationLimit, GrinEnd::TimeLimit].map(GrinEnd::words);
         assert_eq!(words, ["", ", iteration limit reached", ", time limit reached"]);
         assert_eq!(GrinEnd::Stopped.words(), ", stopped");
     }

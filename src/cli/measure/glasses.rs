@@ -35,10 +35,18 @@ impl MeasureGlassesArgs {
         if self.evaluations == Some(0) {
             return Err(CliError::Input("--evaluations: found 0; expected 1 or more".to_owned()));
         }
+        let is_single = self.lenses.count() == 1;
         let compare = |lens: &_, name: &str, stop: &AtomicBool| {
-            let mut notes = ProgressNotes::new();
+            // A bar counts lenses where there are several.
+            let mut notes = if is_single {
+                Some(ProgressNotes::new())
+            } else {
+                ProgressNotes::in_place_of_bar()
+            };
             let mut watch = |progress: GlassProgress| {
-                notes.tell(|| format!("{name}: {}", progress_text(progress)));
+                if let Some(notes) = &mut notes {
+                    notes.tell(|| format!("{name}: {}", progress_text(progress)));
+                }
                 if stop.load(Ordering::Relaxed) {
                     ControlFlow::Break(())
                 } else {
@@ -56,7 +64,7 @@ impl MeasureGlassesArgs {
     }
 }
 
-/// Where a measurement is, in a line.
+/// The state of a measurement that goes on, in a line.
 fn progress_text(GlassProgress { phase, evaluations, merit, exchanges }: GlassProgress) -> String {
     let doing = match phase {
         GlassPhase::Descent => "descent with its own glasses".to_owned(),

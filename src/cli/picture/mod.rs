@@ -193,14 +193,13 @@ impl PictureArgs {
     fn check_numbers(&self) -> Result<(), CliError> {
         let lengths = [
             ("--diagonal", self.diagonal, 1e6, "1e6"),
-            ("--distance", self.distance, 1e12, "1e12"),
-            ("--size", self.size, f64::MAX, "infinity"),
-            ("--focus", self.focus, 1e12, "1e12"),
+            ("--distance", self.distance, 1e12, ", at most 1e12"),
+            ("--size", self.size, f64::MAX, ""),
+            ("--focus", self.focus, 1e12, ", at most 1e12"),
         ];
         for (name, value, most, limit) in lengths {
             if let Some(found) = value.filter(|value| !(*value > 0.0 && *value <= most)) {
-                let text =
-                    format!("{name}: found {found}; expected mm, more than 0 and below {limit}");
+                let text = format!("{name}: found {found}; expected mm, more than 0{limit}");
                 return Err(CliError::Input(text));
             }
         }

@@ -264,7 +264,7 @@ impl PictureArgs {
         if split.without(SAMPLING) > self.error.0 {
             let [taken, asked] = [split.without(SAMPLING), self.error.0].map(|share| 100.0 * share);
             print_note(format!(
-                "note: {asked:.3} % cannot be reached, effects leave {taken:.3} %; sampling goes on"
+                "note: {asked:.3} % cannot be reached, the effects beside sampling alone take {taken:.3} %; sampling goes on"
             ));
         }
         let is_kept = |quick: &PictureLight| {

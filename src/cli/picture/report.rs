@@ -99,19 +99,16 @@ impl PictureReport {
                 _ => writeln!(f)?,
             }
         }
-        match &self.diffraction {
-            Some(DiffractionReport { on: true, change, left, cut, points, reason, .. }) => {
-                let [change, left, cut] = [change, left, cut].map(|share| 100.0 * share);
-                writeln!(
-                    f,
-                    "diffraction on: contrast changes by up to {change:.2} %, {left:.2} % are left, {cut:.2} % of \
-                     the light is cut off, at {points} points: {reason}"
-                )?;
-            }
-            _ => {}
-        }
-        let refused = self.diffraction.as_ref().and_then(|found| found.without_aberrations);
-        refused.map_or(Ok(()), |why| writeln!(f, "aberrations are not in that spread: {why}"))
+        let Some(found) = self.diffraction.as_ref().filter(|found| found.on) else { return Ok(()) };
+        let DiffractionReport { change, left, cut, points, reason, .. } = found;
+        let [change, left, cut] = [change, left, cut].map(|share| 100.0 * share);
+        writeln!(
+            f,
+            "diffraction on: contrast changes by up to {change:.2} %, {left:.2} % are left, {cut:.2} % of \
+             the light is cut off, at {points} points: {reason}"
+        )?;
+        let refused = found.without_aberrations;
+        refused.map_or(Ok(()), |why| writeln!(f, "  aberrations are not in that spread: {why}"))
     }
 
     /// The losses, the ghosts and the map of the error.
