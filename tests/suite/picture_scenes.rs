@@ -71,7 +71,12 @@ fn a_sensor_has_the_numbers_that_it_is_given() {
     // The range of 10 bits is the smaller one: (1023 - 32) / 0.25 electrons.
     let electrons = 0.5 * number(&sensor["white_photons"]);
     assert!((electrons / (0.8 * 991.0 / 0.25) - 1.0).abs() < 1e-9, "{sensor}");
-    refused(2, &[&base[..], &["--gain", "0"]].concat(), "", &["the sensor", "the gain is 0"]);
+    refused(
+        2,
+        &[&base[..], &["--gain", "0"]].concat(),
+        "",
+        &["--gain: found 0; expected a positive number"],
+    );
     refused(2, &[&base[..], &["--diagonal", "2"]].concat(), "", &["--pitch", "--diagonal"]);
     std::fs::write(&file, r#"{"gain": 1, "iso": 100}"#).unwrap();
     refused(2, &base, "", &["own.json", "iso"]);
