@@ -88,7 +88,7 @@ pub fn measure_glass_gain(
         None
     } else {
         let found = exchange(&mut random, limit, watch)?;
-        (!found.is_ended_early).then_some(found.merit)
+        (!found.is_ended_early && found.evaluations > 0).then_some(found.merit)
     };
     Ok(Some(GlassGain {
         merit_before,

@@ -26,6 +26,11 @@ impl BoxedQuadratic {
         Self { matrix, ranges }
     }
 
+    /// True if the range of a variable has an end.
+    pub fn is_bounded(&self) -> bool {
+        self.ranges.iter().flatten().any(|end| end.is_finite())
+    }
+
     /// The value at variables, for a centre.
     pub fn value(&self, variables: &[f64], center: &[f64]) -> f64 {
         let offsets: Vec<f64> = variables.iter().zip(center).map(|(y, c)| y - c).collect();

@@ -61,7 +61,8 @@ pub struct AsBuiltSpot {
     pub focus: FocusTreatment,
     /// The rms of the lens as designed, in mm.
     pub nominal_rms: f64,
-    /// The root of the expected mean square by the form, in mm.
+    /// The root of the expected mean square by the form, in mm; that of its random lenses if the travel of a
+    /// compensator has an end.
     pub form_root_mean_square: f64,
     /// The mean of the rms by the form, in mm.
     pub form_mean_rms: f64,
@@ -334,6 +335,8 @@ fn as_built(
 ) -> AsBuiltSpot {
     let many = sorted(lenses.rms);
     let form_mean_rms = mean(&many);
+    let squares = || mean(&many.iter().map(|rms| rms * rms).collect::<Vec<f64>>());
+    let expected = if form.has_stops() { squares() } else { expected };
     let which = usize::from(focus == FocusTreatment::Refocused);
     // Real lenses and the form on the same errors.
     let pairs: Vec<[f64; 2]> = real

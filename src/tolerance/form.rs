@@ -148,6 +148,12 @@ impl QuadraticForm {
         self.nominal.max(0.0) + self.adjusted.as_ref().map_or(0.0, cost)
     }
 
+    /// True if the travel of a compensator has an end. The form is no quadratic one then, and its expectation is that
+    /// of compensators without one.
+    pub fn has_stops(&self) -> bool {
+        self.adjusted.as_ref().is_some_and(|adjusted| adjusted.travel.is_bounded())
+    }
+
     /// The growth of the expected mean square spot radius by each error in mm², half of what it shares
     /// with others included, with compensators whose travel has no end.
     ///

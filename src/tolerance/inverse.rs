@@ -1,5 +1,6 @@
 //! The loosest tolerances for a spot, or for a share of good lenses, that is asked for.
 
+use super::reduced::{ErrorMultiples, ReducedForm};
 use super::{QuadraticForm, ToleranceError};
 use crate::lens::{Tolerance, ToleranceSheet};
 
@@ -8,7 +9,8 @@ const MOST: f64 = 10.0;
 
 /// The loosest tolerances for an expected mean square spot radius `target` in mm². Each error costs
 /// about the same: half ranges are proportional to one over the root of their second derivative,
-/// within a factor of ten of what they were.
+/// within a factor of ten of what they were. Where a compensator ends at a stop, the mean square is that of random
+/// lenses by the form.
 ///
 /// # Errors
 /// A target that the lens without errors does not reach.
@@ -17,11 +19,19 @@ pub fn loosest_tolerances(
     sheet: &ToleranceSheet,
     target: f64,
 ) -> Result<Vec<Tolerance>, ToleranceError> {
-    if !(target > form.nominal) {
-        let (found, nominal) = (target.max(0.0).sqrt(), form.nominal.max(0.0).sqrt());
+    let nominal = form.as_designed();
+    if !(target > nominal) {
+        let (found, nominal) = (target.max(0.0).sqrt(), nominal.sqrt());
         return Err(ToleranceError::BelowNominal { found, nominal });
     }
     let (factors, total) = equal_costs(form, sheet)?;
+    if form.has_stops() {
+        let shaped = widened(&sheet.errors, |i| factors[i]);
+        let shaped = ToleranceSheet { errors: shaped, ..sheet.clone() };
+        let lenses = RandomLenses::new(form, &shaped)?;
+        let factor = widest(|factor| lenses.mean_square(factor) <= target);
+        return Ok(widened(&shaped.errors, |_| factor));
+    }
     let scale = if total > 0.0 { ((target - form.nominal) / total).sqrt() } else { 1.0 };
     Ok(widened(&sheet.errors, |i| factors[i] * scale))
 }
@@ -68,21 +78,46 @@ pub fn form_yield(
     sheet: &ToleranceSheet,
     limit: f64,
 ) -> Result<f64, ToleranceError> {
-    Ok(yield_at_factor(form, sheet, limit)?(1.0))
+    Ok(RandomLenses::new(form, sheet)?.good(limit, 1.0))
 }
 
-/// The yield as a function of a factor of all tolerances, by the same random lenses for all factors.
-fn yield_at_factor(
-    form: &QuadraticForm,
-    sheet: &ToleranceSheet,
-    limit: f64,
-) -> Result<impl Fn(f64) -> f64 + use<>, ToleranceError> {
-    let reduced = form.reduced(sheet)?;
-    let lenses = reduced.random_lenses(&sheet.errors, SEED, LENSES, &|| false)?;
-    Ok(move |factor| {
-        let is_good = |errors| reduced.at_multiple(errors, factor) <= limit * limit;
-        lenses.iter().filter(|errors| is_good(errors)).count() as f64 / LENSES as f64
-    })
+/// Random lenses by a form, the same ones for every factor of all tolerances.
+struct RandomLenses {
+    form: ReducedForm,
+    lenses: Vec<ErrorMultiples>,
+}
+
+impl RandomLenses {
+    fn new(form: &QuadraticForm, sheet: &ToleranceSheet) -> Result<Self, ToleranceError> {
+        let form = form.reduced(sheet)?;
+        let lenses = form.random_lenses(&sheet.errors, SEED, LENSES, &|| false)?;
+        Ok(Self { form, lenses })
+    }
+
+    fn mean_squares(&self, factor: f64) -> impl Iterator<Item = f64> {
+        self.lenses.iter().map(move |errors| self.form.at_multiple(errors, factor))
+    }
+
+    /// The mean of the mean square spot radii in mm².
+    fn mean_square(&self, factor: f64) -> f64 {
+        self.mean_squares(factor).sum::<f64>() / LENSES as f64
+    }
+
+    /// The share of those with an rms spot of at most `limit` mm.
+    fn good(&self, limit: f64, factor: f64) -> f64 {
+        let good = self.mean_squares(factor).filter(|square| *square <= limit * limit);
+        good.count() as f64 / LENSES as f64
+    }
+}
+
+/// The largest factor of tolerances that a condition permits.
+fn widest(is_permitted: impl Fn(f64) -> bool) -> f64 {
+    let (mut low, mut high) = (1.0 / WIDEST, WIDEST);
+    for _ in 0..HALVINGS {
+        let middle = (low * high).sqrt();
+        if is_permitted(middle) { low = middle } else { high = middle }
+    }
+    low
 }
 
 /// The seed of the lenses from which a yield is told.
@@ -110,11 +145,7 @@ pub fn loosest_for_yield(
     let (factors, _) = equal_costs(form, sheet)?;
     let shaped = widened(&sheet.errors, |i| factors[i]);
     let shaped = ToleranceSheet { errors: shaped, ..sheet.clone() };
-    let good = yield_at_factor(form, &shaped, limit)?;
-    let (mut low, mut high) = (1.0 / WIDEST, WIDEST);
-    for _ in 0..HALVINGS {
-        let middle = (low * high).sqrt();
-        if good(middle) >= share { low = middle } else { high = middle }
-    }
-    Ok(widened(&shaped.errors, |_| low))
+    let lenses = RandomLenses::new(form, &shaped)?;
+    let factor = widest(|factor| lenses.good(limit, factor) >= share);
+    Ok(widened(&shaped.errors, |_| factor))
 }

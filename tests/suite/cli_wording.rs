@@ -158,6 +158,13 @@ fn encircled_energy_says_whether_its_tolerance_was_reached() {
     };
     let text = done(&asked("1e-15"), "");
     assert!(text.contains("tolerance not reached: limited by the number of rays"), "{text}");
+    // Beyond some radius no affordable nodes resolve the fringes.
+    let large = ["analyze", ACHROMAT, "encircled-energy", "--field=0", "--radii=5"];
+    refused(2, &large, "", &["--radii: found 5; expected mm, at most"]);
+    // A point far away has an error of its own.
+    let far = ["analyze", ACHROMAT, "psf", "--field=0", "--error=1%", "--at=0.5,0"];
+    let strehl = &done_json(&far, "")["fields"][0]["strehl"];
+    assert!(strehl["error"].as_f64().unwrap() < 0.01, "{strehl}");
     let found = &done_json(&asked("1%"), "")["fields"][0];
     assert!(found["reached"] == true && found["limit"].is_null(), "{found}");
 }

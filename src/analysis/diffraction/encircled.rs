@@ -43,7 +43,10 @@ pub fn encircled_energy_unless(
     let sphere = ReferenceSphere::for_region(&region)?;
     let encircled = |light: &PupilSamples| light.encircled_unless(center, radii, interrupted);
     let found = PupilSamples::converge(&region, &sphere, None, accuracy, interrupted, encircled)?;
-    let estimate = |k: usize| Estimate::new(found.values[k], found.errors[k], found.rays);
+    // A share that is not resolved is between none and all.
+    let estimate = |k: usize| {
+        Estimate::new(found.values[k].clamp(0.0, 1.0), found.errors[k].min(1.0), found.rays)
+    };
     Ok((0..radii.len()).map(estimate).collect())
 }
 

@@ -348,6 +348,7 @@ impl AnalyzeArgs {
             AnalysisKind::Zernike => self.finish(&run, wavefront::zernikes(&run), output),
             AnalysisKind::Psf => self.finish(&run, point_spread::point_spreads(&run), output),
             AnalysisKind::EncircledEnergy => {
+                point_spread::check_radii(&run, &self.radii)?;
                 self.finish(&run, point_spread::encircled(&run, &self.radii), output)
             }
             AnalysisKind::Mtf => self.finish(&run, contrast::contrasts(&run), output),

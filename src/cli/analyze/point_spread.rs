@@ -5,6 +5,7 @@ use crate::analysis::{
     ContrastLimit, Estimate, PointSpread, ReferenceForm, Strehl, encircled_energy, point_spread,
     strehl,
 };
+use crate::cli::error::CliError;
 use crate::cli::output::{ShortNumber, counted, without_rounding};
 use crate::measure::time_ms;
 use crate::plot::{ChartCurve, CurveChart};
@@ -144,7 +145,8 @@ fn keys(spread: &PointSpread, strehl: Strehl, points: &[[f64; 2]], ms: f64) -> P
     let point =
         |([x, y], e): (&[f64; 2], &Estimate)| IntensityJson { x: *x, y: *y, intensity: timed(*e) };
     PointSpreadJson {
-        strehl: timed(spread.strehl),
+        // That of the image holds for its points too, however far away they are.
+        strehl: timed(strehl.at_chief),
         best_strehl: timed(strehl.best),
         best_at: strehl.best_at,
         best_is_global: strehl.is_brightest,
@@ -160,7 +162,7 @@ fn keys(spread: &PointSpread, strehl: Strehl, points: &[[f64; 2]], ms: f64) -> P
 
 /// The largest error of the parts that did not reach the tolerance, which more rays would make smaller.
 fn limit_of(spread: &PointSpread, strehl: Strehl) -> Option<ContrastLimit> {
-    let image = spread.intensities.iter().chain([&spread.strehl]).map(|e| e.error);
+    let image = spread.intensities.iter().map(|e| e.error);
     let of_image = (!spread.reached).then(|| image.fold(0.0, f64::max));
     let of_strehl = (!strehl.reached).then(|| strehl.at_chief.error.max(strehl.best.error));
     of_image.into_iter().chain(of_strehl).reduce(f64::max).map(ContrastLimit::Nodes)
@@ -248,6 +250,24 @@ struct CircleJson {
 
 /// The radii of the circles, in λF.
 const RADII: [f64; 10] = [0.25, 0.5, 0.75, 1.0, 1.22, 1.5, 2.0, 3.0, 4.0, 6.0];
+
+/// The largest radius of a circle in λF: beyond, no affordable nodes resolve the fringes.
+const LARGEST_RADIUS: f64 = 200.0;
+
+/// Refuses circles that are too large.
+pub(super) fn check_radii(run: &AnalysisRun, asked: &[f64]) -> Result<(), CliError> {
+    let most = LARGEST_RADIUS * unit(run);
+    match asked.iter().find(|radius| **radius > most) {
+        Some(found) => {
+            let most = ShortNumber(most);
+            let text = format!(
+                "--radii: found {found}; expected mm, at most {most}, {LARGEST_RADIUS} lambda F"
+            );
+            Err(CliError::Input(text))
+        }
+        None => Ok(()),
+    }
+}
 
 pub(super) fn encircled(run: &AnalysisRun, asked: &[f64]) -> Vec<AtField<EncircledJson>> {
     let usual = || RADII.iter().map(|r| r * unit(run)).collect();

@@ -192,7 +192,7 @@ impl PictureArgs {
     /// Refuses lengths and counts that no picture has.
     fn check_numbers(&self) -> Result<(), CliError> {
         let lengths = [
-            ("--diagonal", self.diagonal, 1e6, "1e6"),
+            ("--diagonal", self.diagonal, 1e6, ", at most 1e6"),
             ("--distance", self.distance, 1e12, ", at most 1e12"),
             ("--size", self.size, f64::MAX, ""),
             ("--focus", self.focus, 1e12, ", at most 1e12"),

@@ -85,6 +85,31 @@ fn the_loosest_tolerances_reach_the_spot_that_was_asked_for() {
     assert!(refused.unwrap_err().to_string().contains("expected more than"));
 }
 
+/// A focus that ends at its stop is no quadratic form: expectation and loosest tolerances are those of lenses with
+/// the stop, confirmed by real ones.
+#[test]
+fn a_focus_at_its_stop_costs_what_lenses_lose_by_it() {
+    let lens = &lenses()[0];
+    let scene = scene(lens, (3, 6));
+    let wide = sheet(lens, ErrorDistribution::NormalCut);
+    let stopped = ToleranceSheet { focus_travel: Some(0.05), ..wide.clone() };
+    let request = ToleranceRequest { seed: 3, samples: 150, limit: None };
+    let [free, bounded] = [&wide, &stopped].map(|sheet| analyze(&scene, sheet, request).unwrap());
+    let roots = [&free, &bounded].map(|found| found.spots[1].form_root_mean_square);
+    assert!(roots[1] > 1.05 * roots[0], "{roots:?}");
+    let spot = &bounded.spots[1];
+    assert!(spot.form_root_mean_square >= spot.form_mean_rms, "{spot:?}");
+    assert!(spot.form_root_mean_square >= spot.nominal_rms, "{spot:?}");
+    let squares = spot.real_rms.iter().map(|rms| rms * rms).sum::<f64>();
+    let real = (squares / spot.real_rms.len() as f64).sqrt();
+    assert_close(real, roots[1], 0.05 * roots[1], "real lenses");
+    let target = (1.1 * spot.nominal_rms).powi(2);
+    let errors = loosest_tolerances(&bounded.forms[1], &stopped, target).unwrap();
+    let loosest = ToleranceSheet { errors, ..stopped };
+    let found = analyze(&scene, &loosest, request).unwrap().spots[1].form_root_mean_square;
+    assert_close(found, target.sqrt(), 5e-3 * target.sqrt(), "with the loosest tolerances");
+}
+
 /// The loosest tolerances for a yield give it to other lenses too: rays of real ones, other seeds.
 #[test]
 fn the_loosest_tolerances_give_the_yield_that_was_asked_for() {
