@@ -127,7 +127,6 @@ impl BlurPeaks {
         accuracy: Accuracy,
         interrupted: &Interruption<'_>,
     ) -> Result<Self, AnalysisError> {
-        // A pupil that folds at a higher order than the ratios need is not searched.
         let search = BlurSearch { region, sphere, accuracy, interrupted };
         match search.run() {
             Ok(found) => Ok(found),
@@ -189,8 +188,11 @@ impl BlurSearch<'_> {
             return Err(SearchEnd::TooLarge);
         }
         let traced = TracedLight::new(self.region, &nodes);
-        let light = traced.on(self.sphere).map_err(|_| SearchEnd::TooLarge)?;
-        Ok((traced, light))
+        match traced.on(self.sphere) {
+            Ok(light) => Ok((traced, light)),
+            // A pupil that folds at a higher order than the ratios need.
+            Err(_) => Err(SearchEnd::TooLarge),
+        }
     }
 
     /// The first order whose nodes resolve a phase of so many turns over a radius of the pupil.

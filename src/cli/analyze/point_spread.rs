@@ -71,7 +71,7 @@ pub(super) fn point_spreads(run: &AnalysisRun) -> Vec<AtField<PointSpreadJson>> 
         });
         let keys = found.map(|(spread, strehl)| PointSpreadJson {
             rounding: run.rounding(),
-            profiles: if run.is_drawn { profiles(run, field) } else { Default::default() },
+            profiles: if run.is_drawn { profiles(run, field) } else { Profiles::default() },
             ..keys(&spread, strehl, &points, ms)
         });
         AtField::new(field, keys)
@@ -132,7 +132,7 @@ fn profiles(run: &AnalysisRun, field: &SelectedField) -> Profiles {
     let points: Vec<[f64; 2]> = along_x.chain(along_y).collect();
     let accuracy = Accuracy { max_rays: DRAWN_RAYS, ..run.accuracy };
     let found = point_spread(&run.model, field.traced, run.model.primary, &points, accuracy);
-    let Ok(found) = found else { return Default::default() };
+    let Ok(found) = found else { return Profiles::default() };
     let drawn = points.iter().zip(&found.intensities);
     let drawn: Vec<_> = drawn.map(|(at, e)| [1e3 * (at[0] + at[1]), e.value]).collect();
     let (x, y) = drawn.split_at(drawn.len() / 2);
@@ -156,7 +156,7 @@ fn keys(spread: &PointSpread, strehl: Strehl, points: &[[f64; 2]], ms: f64) -> P
         limit: limit_of(spread, strehl),
         points: points.iter().zip(&spread.intensities).map(point).collect(),
         rounding: 0.0,
-        profiles: Default::default(),
+        profiles: Profiles::default(),
     }
 }
 
