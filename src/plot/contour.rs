@@ -76,8 +76,8 @@ pub fn contour_curves(grid: &ContourGrid, unit: &str) -> Vec<ChartCurve> {
         let name = match i {
             0 => "0".to_owned(),
             1.. if least < 0.0 => format!("above, every {} {unit}", ShortNumber(step)),
-            1.. => format!("every {} {unit}", ShortNumber(step)),
-            _ => "below".to_owned(),
+            ..0 if most > 0.0 => format!("below, every {} {unit}", ShortNumber(step)),
+            _ => format!("every {} {unit}", ShortNumber(step)),
         };
         let color = usize::from(i < 0) + 2 * usize::from(i == 0);
         let pieces = grid.line(i as f64 * step);
@@ -92,6 +92,26 @@ mod tests {
 
     fn places(count: i32) -> Vec<f64> {
         (-count..=count).map(|i| f64::from(i) / f64::from(count)).collect()
+    }
+
+    /// A map of one sign has a scale too.
+    #[test]
+    fn every_side_of_zero_names_its_step() {
+        let names = |shift: f64| {
+            let side = places(20);
+            let square = |y: f64| side.iter().map(move |x| Some(x * x + y * y - shift));
+            let values = side.iter().flat_map(|y| square(*y)).collect();
+            let curves = contour_curves(
+                &ContourGrid { places: [side.clone(), side.clone()], values },
+                "waves",
+            );
+            let mut names: Vec<String> = curves.into_iter().map(|curve| curve.name).collect();
+            names.dedup();
+            names
+        };
+        assert_eq!(names(0.0), ["0", "every 0.2 waves"]);
+        assert_eq!(names(2.0), ["every 0.2 waves", "0"]);
+        assert_eq!(names(1.0), ["below, every 0.2 waves", "0", "above, every 0.2 waves"]);
     }
 
     /// The contours of a paraboloid are circles; without a value there is no line.

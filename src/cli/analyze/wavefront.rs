@@ -149,7 +149,12 @@ impl TextLines for WavefrontJson {
     fn charts(&self) -> Vec<CurveChart> {
         let curves = self.grid.as_ref().map(|grid| contour_curves(grid, "wavelengths"));
         let curves = curves.unwrap_or_default();
-        vec![CurveChart::map("wavefront", ["pupil x", "pupil y"], curves)]
+        let range = self.grid.as_ref().and_then(ContourGrid::range);
+        let title = range.map_or("wavefront".to_owned(), |[least, most]| {
+            let [low, high, between] = [least, most, most - least].map(ShortNumber);
+            format!("wavefront, {low} to {high} wavelengths, peak to valley {between}")
+        });
+        vec![CurveChart::map(&title, ["pupil x", "pupil y"], curves)]
     }
 }
 
