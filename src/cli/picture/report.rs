@@ -63,6 +63,8 @@ pub(super) struct SensorReport {
     pub(super) bayer: bool,
     pub(super) luminance: f64,
     pub(super) seconds: f64,
+    /// The side of a pixel of the picture in um, which the sensor's own may differ from.
+    pub(super) pixel_um: f64,
     pub(super) white_photons: f64,
     /// At white, at mid grey and at a hundredth of white.
     pub(super) signal_to_noise: [f64; 3],
@@ -74,7 +76,8 @@ impl Display for SensorReport {
         let [white, grey, dark] = self.signal_to_noise;
         let seconds = ShortNumber(self.seconds);
         writeln!(f, "sensor {}: {seconds} s at {} cd/m2", self.name, self.luminance)?;
-        writeln!(f, "  {} photons at white", ShortNumber(self.white_photons))?;
+        let [photons, pixel] = [self.white_photons, self.pixel_um].map(ShortNumber);
+        writeln!(f, "  {photons} photons at white on a pixel of {pixel} um")?;
         writeln!(
             f,
             "  signal to noise {white:.1} at white, {grey:.1} at mid grey, {dark:.1} at 1 %"

@@ -214,6 +214,7 @@ impl PictureArgs {
             bayer: self.exposed.bayer,
             luminance,
             seconds,
+            pixel_um: 1e3 * picture.frame.pitch,
             white_photons: photons(1.0),
             signal_to_noise: [1.0, MID_GREY, 0.01]
                 .map(|v| sensor.signal_to_noise(photons(v), dark)),
