@@ -259,7 +259,17 @@ fn errors_are_sorted_by_either_share_and_printed_all() {
     let all = done(&[&few[..], &["--all"]].concat(), "");
     assert!(!all.contains(" more (--all)") && all.lines().count() > brief.lines().count());
     let sharp = ["--loosest", "0.0001"];
-    refused(2, &[&few[..], &sharp].concat(), "", &["error: --loosest: found 0.0001 mm; expected"]);
+    refused(
+        2,
+        &[&few[..], &sharp].concat(),
+        "",
+        &["error: --loosest: an rms of 0.0001 mm is asked for; expected"],
+    );
     let sharp = ["--rms", "0.0001", "--loosest-yield", "90%"];
-    refused(2, &[&few[..], &sharp].concat(), "", &["error: --rms: found 0.0001 mm; expected"]);
+    refused(
+        2,
+        &[&few[..], &sharp].concat(),
+        "",
+        &["error: --rms: an rms of 0.0001 mm is asked for; expected"],
+    );
 }
