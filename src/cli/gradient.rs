@@ -107,10 +107,10 @@ impl GradientArgs {
         lens.surfaces[model.stop()].semi_diameter = Some(model.stop_radius());
         let (found, ms) = time_ms(|| self.differentiate(&model));
         let found = found.map_err(|cause| match cause {
-            DerivativeError::Dark(..) => CliError::Input(format!("{blamed}: {cause}")),
-            DerivativeError::Launch(_) | DerivativeError::Unbounded => {
-                CliError::Input(format!("{}: {cause}", opened.file))
+            DerivativeError::Dark(..) | DerivativeError::Launch(_) => {
+                CliError::Input(format!("{blamed}: {cause}"))
             }
+            DerivativeError::Unbounded => CliError::Input(format!("{}: {cause}", opened.file)),
             _ => CliError::Failed(format!("{}: {cause}", opened.file)),
         })?;
         if found.least_rays > self.rays {
