@@ -50,9 +50,11 @@ pub struct ContrastSummary {
 
 /// More rays than those of the spots are taken until they change the contrast by less than this.
 const ENOUGH: f64 = 1e-3;
-/// The factor by which the tolerance of the spots falls for that, and how often it does.
+/// The factor by which the tolerance of the spots falls for that, the changes of the rays that are compared, and the
+/// tolerance below which rays do not change any more.
 const FINER: f64 = 0.1;
 const ROUNDS: usize = 3;
+const FINEST: f64 = 1e-12;
 
 impl ContrastChanges {
     /// The contrast of a lens at a zoom position at a frequency in cycles/mm, with its tolerances and
@@ -95,9 +97,15 @@ impl ContrastChanges {
         let mut judge = ContrastJudge::new(scene.clone(), sheet, frequency);
         let mut nominal = judge.as_designed()?;
         let (mut tolerance, mut sampling_error) = (tolerance, f64::INFINITY);
-        for _ in 0..ROUNDS {
+        let mut compared = 0;
+        while compared < ROUNDS && tolerance > FINEST {
             tolerance *= FINER;
             let finer = ToleranceScene::new_until(lens, zoom, tolerance, stop)?;
+            // The same rays tell nothing.
+            if finer.beam.rays() == judge.scene.beam.rays() {
+                continue;
+            }
+            compared += 1;
             judge = ContrastJudge::new(finer, sheet, frequency);
             let found = judge.as_designed()?;
             let apart = [0, 1].map(|i| (found[i] - nominal[i]).abs());

@@ -114,6 +114,10 @@ fn the_contrast_of_a_lens_with_errors_is_that_of_the_lens() {
     let exact = curve.points[0].tangential.modulus.value;
     let error = found.sampling_error + 1e-3;
     assert!((found.nominal[0] - exact).abs() < error, "{} {exact} {error}", found.nominal[0]);
+    // A frequency that no affordable rays resolve has no error of zero.
+    let scene = ToleranceScene::new(&lens, 0, 0.01).unwrap();
+    let far = ContrastChanges::new((&lens, 0, 0.01), &scene, (&sheet, 1e6), &never).unwrap();
+    assert!(found.sampling_error > 0.0 && far.sampling_error > 1e-3, "{}", far.sampling_error);
     let [fixed, refocused] = found.changes[0].unwrap();
     let mut longer = lens.clone();
     longer.surfaces[last].thickness += 0.1;
