@@ -111,6 +111,18 @@ fn tolerances_are_exact_and_their_costs_are_told() {
     assert_eq!(report["designs"], Value::Null);
 }
 
+/// An exchange of glasses ends at its number of evaluations, and a round that does not fit does not count.
+#[test]
+fn an_exchange_of_glasses_ends_at_its_evaluations() {
+    let command = ["measure", "glasses", "lenses/achromat_ac254_100.json", "--evaluations"];
+    refused(2, &[&command[..], &["0"]].concat(), "", &["--evaluations: found 0"]);
+    let found = done_json(&[&command[..], &["1"]].concat(), "");
+    let row = &found["rows"][0];
+    assert!(row["finished"] == false && row["exchanges"] == 0, "{row}");
+    assert!(row["evaluations"] == 0 && row["merit_random"].is_null(), "{row}");
+    assert_eq!(row["merit"], row["merit_optimized"]);
+}
+
 /// The spots of a singlet depend on its bending alone, and have one minimum in it; other ends are at
 /// limits of its thickness and rims.
 #[test]
