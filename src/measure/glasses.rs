@@ -80,13 +80,13 @@ pub fn measure_glass_gain(
     search.restart(&lens)?;
     let merit_optimized = search.merit();
     let guided = exchange(&mut search, (GlassPhase::Guided, most), watch)?;
-    let mut random = GlassSearch::new(&first, &goal, tolerance, glass::catalogue(), seed)?;
-    random = random.without_predictions();
-    random.restart(&lens)?;
-    let limit = (GlassPhase::Random, Some(guided.evaluations));
     let merit_random = if guided.is_ended_early || guided.evaluations == 0 {
         None
     } else {
+        let random = GlassSearch::new(&first, &goal, tolerance, glass::catalogue(), seed)?;
+        let mut random = random.without_predictions();
+        random.restart(&lens)?;
+        let limit = (GlassPhase::Random, Some(guided.evaluations));
         let found = exchange(&mut random, limit, watch)?;
         (!found.is_ended_early && found.evaluations > 0).then_some(found.merit)
     };

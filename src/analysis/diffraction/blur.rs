@@ -146,22 +146,27 @@ struct BlurSearch<'a> {
 
 impl BlurSearch<'_> {
     fn run(&self) -> Result<BlurPeaks, SearchEnd> {
-        let (_, few) = self.light(0, FEW)?;
-        let rays = few.points.len();
-        let (traced, light) = self.light(rays, self.resolving_order(few.turns(0.0))?)?;
-        let rays = rays + traced.cost;
+        let (traced, few) = self.light((0, 0.0), FEW)?;
+        let rays = traced.cost;
+        let coarse = self.resolving_order(few.turns(0.0))?;
+        let (traced, light) = self.light((rays, 0.0), coarse)?;
+        let mut rays = rays + traced.cost;
         let found = light.intensity_at(brightest(&light, &[]));
         let blur = Blur::new(&traced, &light, self.sphere);
         let planes = self.planes(&blur, &light, MARGIN * found.sqrt())?;
         let reach = planes.iter().map(|plane| plane.reach).fold(0.0, f64::max);
         let turns = light.spread() * reach / light.wavelength;
-        let (traced, light) = self.light(rays, self.resolving_order(turns)?)?;
-        let rays = rays + traced.cost;
         let points: f64 = planes.iter().map(BlurPlane::points).sum();
-        let parts = if light.mirrored { 2.0 } else { 4.0 };
-        if parts * points * light.amplitudes.len() as f64 > MOST_PRODUCTS {
-            return Err(SearchEnd::TooLarge);
-        }
+        let products = points * if light.mirrored { 2.0 } else { 4.0 };
+        let order = self.resolving_order(turns)?;
+        let light = if order > coarse {
+            let (traced, light) = self.light((rays, products), order)?;
+            rays += traced.cost;
+            light
+        } else {
+            check_products(products, light.points.len())?;
+            light
+        };
         let seen = PlaneLight::new(&light, blur.chief);
         let mut maxima = Vec::new();
         for plane in &planes {
@@ -180,10 +185,16 @@ impl BlurSearch<'_> {
         if (self.interrupted)() { Err(SearchEnd::Interrupted) } else { Ok(()) }
     }
 
-    /// The light of an order, if it and the rays before it are not too many.
-    fn light(&self, before: usize, order: usize) -> Result<(TracedLight, PupilSamples), SearchEnd> {
+    /// The light of an order, if it and the rays before it are not too many, nor the products of real numbers that each
+    /// node takes.
+    fn light(
+        &self,
+        (before, products): (usize, f64),
+        order: usize,
+    ) -> Result<(TracedLight, PupilSamples), SearchEnd> {
         self.go_on()?;
         let nodes = self.region.nodes(order);
+        check_products(products, nodes.points.len())?;
         if before + nodes.rays + 2 * nodes.points.len() > self.accuracy.max_rays {
             return Err(SearchEnd::TooLarge);
         }
@@ -243,6 +254,11 @@ impl BlurSearch<'_> {
         ends.dedup_by(|a, b| (a.0 - b.0).abs() <= 1e-9 * b.0);
         Ok(ends.into_iter().take(KEPT).map(|(_, end)| end).collect())
     }
+}
+
+/// Refuses more products than a search may take, given those of each node.
+fn check_products(products: f64, nodes: usize) -> Result<(), SearchEnd> {
+    if products * nodes as f64 > MOST_PRODUCTS { Err(SearchEnd::TooLarge) } else { Ok(()) }
 }
 
 /// Those local maxima that may be the peak, without those beside a higher one; false if they are too many to be
