@@ -205,7 +205,7 @@ pub(super) fn mean_spot(landed: &[LandedField]) -> SpotMoments<f64> {
 }
 
 /// The plane of a sensor: `z = shift + by_x x + by_y y`.
-struct Sensor {
+pub(super) struct Sensor {
     shift: f64,
     by_x: f64,
     by_y: f64,
@@ -215,7 +215,7 @@ struct Sensor {
 
 impl Sensor {
     /// The sensor with its adjustments: tilted about x first, then about the y axis that this has turned.
-    fn new(adjustments: &[Compensator], positions: &[f64]) -> Self {
+    pub(super) fn new(adjustments: &[Compensator], positions: &[f64]) -> Self {
         let of = |part: AdjustedPart| {
             let mut own = adjustments.iter().zip(positions);
             own.find(|(own, _)| own.part == part).map_or(0.0, |(_, position)| *position)
@@ -236,7 +236,7 @@ impl Sensor {
 
     /// The point where a ray meets the sensor, and the displacement of that along the axis by a
     /// displacement of the plane.
-    fn meet(&self, [x, y, u, v]: &ImageRay<f64>) -> ([f64; 3], f64) {
+    pub(super) fn meet(&self, [x, y, u, v]: &ImageRay<f64>) -> ([f64; 3], f64) {
         let advance = 1.0 / (1.0 - self.by_x * u - self.by_y * v);
         let z = (self.shift + self.by_x * x + self.by_y * y) * advance;
         ([x + z * u, y + z * v, z], advance)

@@ -1,5 +1,6 @@
 //! The whole analysis: sensitivities, the quadratic form, real lenses, and how well both agree.
 
+use super::form::growth_shares;
 use super::monte_carlo::{KnownLens, RealLensRun};
 use super::pupils::PupilTreatment;
 use super::travel::{AdjustmentTravel, StoppedLenses, stopped_lenses, travels};
@@ -297,12 +298,7 @@ impl ToleranceAnalysis {
     /// # Errors
     /// Correlations that no errors can have.
     pub fn growth_shares(&self, sheet: &ToleranceSheet) -> Result<Vec<[f64; 2]>, ToleranceError> {
-        let [fixed, refocused] = self.forms.each_ref().map(|form| form.growth(sheet));
-        let (fixed, refocused) = (fixed?, refocused?);
-        let total = |growth: &[f64]| growth.iter().sum::<f64>().abs().max(f64::MIN_POSITIVE);
-        let totals = [total(&fixed), total(&refocused)];
-        let pairs = fixed.into_iter().zip(refocused);
-        Ok(pairs.map(|(a, b)| [a / totals[0], b / totals[1]]).collect())
+        growth_shares(&self.forms, sheet)
     }
 }
 

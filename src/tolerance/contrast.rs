@@ -2,16 +2,18 @@
 //!
 //! The geometric contrast of the held rays, `|Σ w exp(2πi ν s)|` with `s` the place of a ray along the
 //! image of a field, tangential and sagittal, is computed for the lens with each error at both ends of
-//! its range, at the fixed image plane and with all compensators adjusted for the least spot. Its changes
-//! are differences of real rays, not derivatives; diffraction lowers the contrast before and after.
+//! its range, at the fixed image plane and with all compensators adjusted for the least spot. The rays move
+//! there by their derivatives, from one sweep back ([`super::linear_contrast`]); a lens without such a sweep
+//! is traced. Diffraction lowers the contrast before and after.
 
 use super::adjusted::LensToAdjust;
 use super::compensation::adjustments;
+use super::linear_contrast::linear_changes;
 use super::monte_carlo::{BeamColumns, LandedField};
 use super::{
     RealMerit, RealMeritRequest, StopTest, ToleranceError, ToleranceScene, refuse_if_stopped,
 };
-use crate::lens::{Compensator, Lens, Perturbation, ToleranceSheet};
+use crate::lens::{Compensator, Lens, Perturbation, Tolerance, ToleranceSheet};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -26,9 +28,53 @@ pub struct ContrastChanges {
     pub nominal: [f64; 2],
     /// The error of the contrast by the sampling of the pupils: its change with more rays.
     pub sampling_error: f64,
-    /// For each error the changes of the contrast at the lower and at the upper end of its range, at the
-    /// fixed image plane and adjusted; `None` if a ray does not arrive there.
-    pub changes: Vec<Option<[[f64; 2]; 2]>>,
+    /// For each error the changes of the contrast; `None` if a ray does not arrive there.
+    pub changes: Vec<Option<ContrastChange>>,
+}
+
+/// The changes of a contrast by an error, at the fixed image plane and adjusted.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ContrastChange {
+    /// At the lower and at the upper end of its range.
+    pub ends: [[f64; 2]; 2],
+    /// The derivative, per unit of the error.
+    pub first: [f64; 2],
+}
+
+/// The error at which derivatives are taken, as a share of the range: the contrast is a smooth function of it, so
+/// that the part of the third order is some 1e-6 of the derivative.
+const SHARE: f64 = 1e-3;
+
+impl ContrastChange {
+    /// The sum of both.
+    pub(super) fn plus(self, other: Self) -> Self {
+        let sum = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];
+        Self {
+            ends: [0, 1].map(|i| sum(self.ends[i], other.ends[i])),
+            first: sum(self.first, other.first),
+        }
+    }
+
+    /// The changes by an error of a half range from the contrasts at shares of it; `None` if one is missing.
+    ///
+    /// # Errors
+    /// As those of `contrast`.
+    pub(super) fn of_range(
+        half_range: f64,
+        nominal: [f64; 2],
+        contrast: impl Fn(f64) -> Result<Option<[f64; 2]>, ToleranceError>,
+    ) -> Result<Option<Self>, ToleranceError> {
+        let shares = [-1.0, -SHARE, SHARE, 1.0].map(|share| contrast(share * half_range));
+        let [low, before, behind, high] = shares;
+        let all = (low?, before?, behind?, high?);
+        let (Some(low), Some(before), Some(behind), Some(high)) = all else { return Ok(None) };
+        let step = 2.0 * SHARE * half_range;
+        let first = |i: usize| if step > 0.0 { (behind[i] - before[i]) / step } else { 0.0 };
+        Ok(Some(Self {
+            ends: [0, 1].map(|i| [low[i] - nominal[i], high[i] - nominal[i]]),
+            first: [0, 1].map(first),
+        }))
+    }
 }
 
 /// The contrast at a frequency of lenses that are made, the mean over fields and over the tangential and the
@@ -94,7 +140,7 @@ impl ContrastChanges {
         (sheet, frequency): (&ToleranceSheet, f64),
         stop: StopTest<'_>,
     ) -> Result<(Self, ContrastJudge), ToleranceError> {
-        let mut judge = ContrastJudge::new(scene.clone(), sheet, frequency);
+        let mut judge = ContrastJudge::new(scene.clone(), sheet, frequency)?;
         let mut nominal = judge.as_designed()?;
         let (mut tolerance, mut sampling_error) = (tolerance, f64::INFINITY);
         let mut compared = 0;
@@ -106,7 +152,7 @@ impl ContrastChanges {
                 continue;
             }
             compared += 1;
-            judge = ContrastJudge::new(finer, sheet, frequency);
+            judge = ContrastJudge::new(finer, sheet, frequency)?;
             let found = judge.as_designed()?;
             let apart = [0, 1].map(|i| (found[i] - nominal[i]).abs());
             (nominal, sampling_error) = (found, apart[0].max(apart[1]));
@@ -114,17 +160,10 @@ impl ContrastChanges {
                 break;
             }
         }
-        let change = |t: &crate::lens::Tolerance| {
-            refuse_if_stopped(stop)?;
-            let end = |value: f64| judge.contrast(&[(t.error, value)]);
-            let ends = end(-t.half_range)?.zip(end(t.half_range)?);
-            let by_plane = |(low, high): ([f64; 2], [f64; 2])| {
-                [0, 1].map(|i| [low[i] - nominal[i], high[i] - nominal[i]])
-            };
-            Ok(ends.map(by_plane))
+        let changes = match linear_changes((scene, &judge.scene), (sheet, frequency), stop)? {
+            Some(changes) => changes.into_iter().map(Some).collect(),
+            None => judge.changes(sheet, nominal, stop)?,
         };
-        let changes = sheet.errors.par_iter().map(change);
-        let changes = changes.collect::<Result<_, ToleranceError>>()?;
         Ok((Self { frequency, nominal, sampling_error, changes }, judge))
     }
 
@@ -146,7 +185,7 @@ impl ContrastChanges {
         for (tolerance, changes) in sheet.errors.iter().zip(&self.changes) {
             let share = tolerance.distribution.deviation().powi(2);
             let changes = (*changes)?;
-            for (sum, [low, high]) in sum.iter_mut().zip(changes) {
+            for (sum, [low, high]) in sum.iter_mut().zip(changes.ends) {
                 *sum += 0.5 * share * (low + high);
             }
         }
@@ -160,17 +199,39 @@ struct ContrastJudge {
     columns: BeamColumns,
     adjustments: Vec<Compensator>,
     frequency: f64,
+    /// The tangential direction of each field.
+    directions: Vec<[f64; 2]>,
 }
 
 impl ContrastJudge {
-    fn new(scene: ToleranceScene, sheet: &ToleranceSheet, frequency: f64) -> Self {
+    fn new(
+        scene: ToleranceScene,
+        sheet: &ToleranceSheet,
+        frequency: f64,
+    ) -> Result<Self, ToleranceError> {
         let columns = BeamColumns::new(&scene.beam);
-        Self { scene, columns, adjustments: adjustments(sheet), frequency }
+        let designed = columns.landings(&scene.lens.systems).ok_or_else(lost_as_designed)?;
+        let directions = designed.iter().map(tangential).collect();
+        Ok(Self { scene, columns, adjustments: adjustments(sheet), frequency, directions })
+    }
+
+    /// The changes by errors whose rays are traced.
+    fn changes(
+        &self,
+        sheet: &ToleranceSheet,
+        nominal: [f64; 2],
+        stop: StopTest<'_>,
+    ) -> Result<Vec<Option<ContrastChange>>, ToleranceError> {
+        let change = |own: &Tolerance| {
+            refuse_if_stopped(stop)?;
+            let contrast = |value: f64| self.contrast(&[(own.error, value)]);
+            ContrastChange::of_range(own.half_range, nominal, contrast)
+        };
+        sheet.errors.par_iter().map(change).collect()
     }
 
     fn as_designed(&self) -> Result<[f64; 2], ToleranceError> {
-        let lost = || ToleranceError::Other("a ray of the lens as designed is lost".to_owned());
-        self.contrast(&[])?.ok_or_else(lost)
+        self.contrast(&[])?.ok_or_else(lost_as_designed)
     }
 
     /// The contrast with some errors at the fixed image plane and adjusted; `None` if a ray does not
@@ -185,29 +246,39 @@ impl ContrastJudge {
         let Some(landed) = self.columns.landings(&made.systems(&[])?) else { return Ok(None) };
         let positions = made.adjust(&landed)?.positions;
         let adjusted = made.on_sensor(&landed, &positions)?;
-        let contrast = |fields: &[LandedField]| mean_contrast(fields, self.frequency);
+        let contrast = |fields: &[LandedField]| -> f64 {
+            let pairs = fields.iter().zip(&self.directions);
+            pairs.map(|(field, along)| field_contrast(field, *along, self.frequency)).sum()
+        };
         Ok(adjusted.map(|adjusted| [contrast(&landed), contrast(&adjusted)]))
     }
 }
 
-/// The mean over fields and over both directions.
-fn mean_contrast(fields: &[LandedField], frequency: f64) -> f64 {
-    let of = |field: &LandedField| {
-        let mean = |i: usize| field.rays.iter().map(|(ray, w)| w * ray[i]).sum::<f64>();
-        let [x, y] = [mean(0), mean(1)];
-        let far = x.hypot(y);
-        // A field on the axis has no direction of its own.
-        let [ux, uy] = if far > 0.0 { [x / far, y / far] } else { [0.0, 1.0] };
-        let along = |[ux, uy]: [f64; 2]| {
-            let (mut re, mut im) = (0.0, 0.0);
-            for (ray, weight) in &field.rays {
-                let phase = TAU * frequency * ((ray[0] - x) * ux + (ray[1] - y) * uy);
-                re += weight * phase.cos();
-                im += weight * phase.sin();
-            }
-            re.hypot(im)
-        };
-        field.weight * 0.5 * (along([ux, uy]) + along([uy, -ux]))
+fn lost_as_designed() -> ToleranceError {
+    ToleranceError::Other("a ray of the lens as designed is lost".to_owned())
+}
+
+/// The distance of a point from the axis in mm below which it has no direction of its own.
+const ON_AXIS: f64 = 1e-9;
+
+/// The tangential direction of the field of some rays, along y for one on the axis.
+pub(super) fn tangential(field: &LandedField) -> [f64; 2] {
+    let mean = |i: usize| field.rays.iter().map(|(ray, w)| w * ray[i]).sum::<f64>();
+    let [x, y] = [mean(0), mean(1)];
+    let far = x.hypot(y);
+    if far > ON_AXIS { [x / far, y / far] } else { [0.0, 1.0] }
+}
+
+/// The mean contrast along a direction and across it, times the weight of the field.
+pub(super) fn field_contrast(field: &LandedField, [ux, uy]: [f64; 2], frequency: f64) -> f64 {
+    let along = |[ux, uy]: [f64; 2]| {
+        let (mut re, mut im) = (0.0, 0.0);
+        for (ray, weight) in &field.rays {
+            let phase = TAU * frequency * (ray[0] * ux + ray[1] * uy);
+            re += weight * phase.cos();
+            im += weight * phase.sin();
+        }
+        re.hypot(im)
     };
-    fields.iter().map(of).sum()
+    field.weight * 0.5 * (along([ux, uy]) + along([uy, -ux]))
 }

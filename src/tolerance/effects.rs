@@ -15,8 +15,9 @@ use super::pupil_edge::{EdgeProducts, EdgeReference, FieldEdge, InnerRays, set_m
 use super::pupils::{FieldPupils, PupilTreatment, ScenePupils};
 use super::sensitivity::{RaySensitivity, Sensitivity, second_derivatives, sensitivities_until};
 use super::sweep::SweptField;
+use super::two_planes::TwoPlanes;
 use super::{StopTest, ToleranceError, ToleranceScene, refuse_if_stopped};
-use crate::lens::{Perturbation, System};
+use crate::lens::Perturbation;
 use crate::math::dot;
 use crate::pupil::EdgeRay;
 use crate::trace::Tracer;
@@ -300,7 +301,7 @@ impl RayEffects {
 }
 
 /// The errors without repetition, and for each error its place among these.
-fn different_errors(errors: &[Perturbation]) -> (Vec<Perturbation>, Vec<usize>) {
+pub(super) fn different_errors(errors: &[Perturbation]) -> (Vec<Perturbation>, Vec<usize>) {
     let (mut places, mut different) = (BTreeMap::new(), Vec::new());
     let place = |error: &Perturbation| {
         *places.entry(*error).or_insert_with(|| {
@@ -313,7 +314,7 @@ fn different_errors(errors: &[Perturbation]) -> (Vec<Perturbation>, Vec<usize>) 
 }
 
 /// The numbers that errors change, in order, and the errors as combinations of them.
-fn combinations(
+pub(super) fn combinations(
     scene: &ToleranceScene,
     errors: &[Perturbation],
 ) -> (Vec<MadeNumber>, ErrorCombinations) {
@@ -340,34 +341,7 @@ fn from_columns(rows: usize, columns: &[DVector<f64>]) -> DMatrix<f64> {
     if columns.is_empty() { DMatrix::zeros(rows, 0) } else { DMatrix::from_columns(columns) }
 }
 
-/// The share of the length of a lens by which the second image plane is displaced where the best focus
-/// tells no better one.
-const PLANE: f64 = 1e-3;
-
-/// The lens in front of its image plane and of another one: rays are straight there.
-struct TwoPlanes {
-    near: Vec<Tracer<f64>>,
-    far: Vec<Tracer<f64>>,
-    /// The distance of the planes in mm.
-    distance: f64,
-}
-
 impl TwoPlanes {
-    fn new(scene: &ToleranceScene, focus: f64) -> Result<Self, ToleranceError> {
-        let systems = &scene.lens.systems;
-        let length = systems[scene.lens.primary].vertex_positions().last().map_or(1.0, |z| z.abs());
-        let least = PLANE * if length > 0.0 { length } else { 1.0 };
-        let distance = if focus.abs() > least { focus } else { least };
-        let displaced = |system: &System<f64>| {
-            let mut system = system.clone();
-            let last = system.surfaces.len().saturating_sub(2);
-            system.surfaces[last].thickness += distance;
-            system
-        };
-        let far: Vec<System<f64>> = systems.iter().map(displaced).collect();
-        Ok(Self { near: open_tracers(systems)?, far: open_tracers(&far)?, distance })
-    }
-
     /// The displacements and the bends by each number, a column each, and the mean effects.
     fn columns(
         &self,

@@ -114,6 +114,11 @@ impl AdjustedForm {
         self.travel.value(&self.travel.minimum(best), best)
     }
 
+    /// The adjustments of a lens with these errors within their travel, focus first.
+    pub fn with_errors(&self, errors: &[f64]) -> Vec<f64> {
+        self.travel.minimum(&self.best(errors))
+    }
+
     /// The best adjustments of a lens with these errors, whatever their travel.
     fn best(&self, errors: &[f64]) -> Vec<f64> {
         let row = |i: usize| -> f64 {
@@ -129,7 +134,7 @@ impl QuadraticForm {
         let form = FixedForm::new(effects, focus, compensation);
         match focus {
             FocusTreatment::Fixed => form.without_adjustment(),
-            FocusTreatment::Refocused => form.adjusted(compensation),
+            FocusTreatment::Refocused => form.adjusted(&compensation.adjustments),
         }
     }
 
@@ -179,6 +184,59 @@ impl QuadraticForm {
     /// The form in few combinations of the errors that carry nearly all of it.
     pub(super) fn reduced(&self, sheet: &ToleranceSheet) -> Result<ReducedForm, ToleranceError> {
         Ok(ReducedForm::new(self, &ErrorMixture::new(sheet)?))
+    }
+}
+
+/// The share of each error in the growth of the expectation of each form; correlated errors share what they do
+/// together.
+///
+/// # Errors
+/// Correlations that no errors can have.
+pub(super) fn growth_shares(
+    forms: &[QuadraticForm; 2],
+    sheet: &ToleranceSheet,
+) -> Result<Vec<[f64; 2]>, ToleranceError> {
+    let [fixed, adjusted] = forms.each_ref().map(|form| form.growth(sheet));
+    let (fixed, adjusted) = (fixed?, adjusted?);
+    let total = |growth: &[f64]| growth.iter().sum::<f64>().abs().max(f64::MIN_POSITIVE);
+    let totals = [total(&fixed), total(&adjusted)];
+    let pairs = fixed.into_iter().zip(adjusted);
+    Ok(pairs.map(|(a, b)| [a / totals[0], b / totals[1]]).collect())
+}
+
+/// Numbers of all rays, of which the mean squares make a form, with their derivatives: each times the root of
+/// the weight of its ray.
+pub(super) struct LinearEffects {
+    /// Without errors.
+    pub(super) offsets: DVector<f64>,
+    /// By each number of the lens, a column each.
+    pub(super) numbers: DMatrix<f64>,
+    /// By a displacement of the image plane.
+    pub(super) by_focus: DVector<f64>,
+    /// By the other compensators.
+    pub(super) adjustments: Vec<DVector<f64>>,
+    /// The mean products of the numbers of rays with their second derivatives by the displacement and each number.
+    pub(super) mixed: Vec<f64>,
+    /// The same by the displacement twice.
+    pub(super) bend: f64,
+    /// The errors as combinations of numbers.
+    pub(super) combinations: ErrorCombinations,
+    /// The second derivative of the mean square by each error, where it is known.
+    pub(super) exact: Option<Vec<f64>>,
+    /// The position of the image plane in mm.
+    pub(super) focus: f64,
+}
+
+impl LinearEffects {
+    /// The form at the image plane of these effects.
+    pub(super) fn fixed(self) -> QuadraticForm {
+        FixedForm::of_effects(self).without_adjustment()
+    }
+
+    /// The form with all compensators adjusted, focus first, where these effects are those at its best position
+    /// without errors.
+    pub(super) fn adjusted(self, adjustments: &[Compensator]) -> QuadraticForm {
+        FixedForm::of_effects(self).adjusted(adjustments)
     }
 }
 
@@ -246,6 +304,42 @@ impl FixedForm {
         form
     }
 
+    fn of_effects(effects: LinearEffects) -> Self {
+        let LinearEffects { offsets, numbers, by_focus, adjustments, .. } = effects;
+        let columns = || std::iter::once(&by_focus).chain(&adjustments);
+        let count = 1 + adjustments.len();
+        let mut form = Self {
+            nominal: offsets.norm_squared(),
+            first: 2.0 * numbers.tr_mul(&offsets),
+            among: 2.0 * numbers.tr_mul(&numbers),
+            held: DMatrix::zeros(0, 0),
+            exact: effects.exact,
+            combinations: effects.combinations,
+            focus: effects.focus,
+            by_adjustment: DVector::zeros(count),
+            by_both: DMatrix::zeros(count, numbers.ncols()),
+            among_adjustments: DMatrix::zeros(count, count),
+        };
+        form.held = form.among.clone();
+        for (a, column) in columns().enumerate() {
+            // The focus is at its best without errors.
+            form.by_adjustment[a] = if a == 0 { 0.0 } else { 2.0 * column.dot(&offsets) };
+            form.by_both.set_row(a, &(2.0 * numbers.tr_mul(column)).transpose());
+            for (b, other) in columns().enumerate() {
+                form.among_adjustments[(a, b)] = 2.0 * column.dot(other);
+            }
+        }
+        for (m, mixed) in effects.mixed.iter().enumerate() {
+            form.by_both[(0, m)] += 2.0 * mixed;
+        }
+        // A position that is no least one has no curvature of its own.
+        let curvature = form.among_adjustments[(0, 0)] + 2.0 * effects.bend;
+        if curvature > 0.0 {
+            form.among_adjustments[(0, 0)] = curvature;
+        }
+        form
+    }
+
     /// Numbers by each error from those by each number of the lens.
     fn by_errors<'a>(&'a self, by: &'a DVector<f64>) -> impl Iterator<Item = f64> + 'a {
         let sum = |row: &Vec<(usize, f64)>| row.iter().map(|(m, factor)| factor * by[*m]).sum();
@@ -268,7 +362,7 @@ impl FixedForm {
     }
 
     /// The form at the least over all adjustments.
-    fn adjusted(self, compensation: &Compensation) -> QuadraticForm {
+    fn adjusted(self, adjustments: &[Compensator]) -> QuadraticForm {
         let inverse = scaled_pseudoinverse(&self.among_adjustments);
         let at_rest = -(&inverse * &self.by_adjustment);
         let by_numbers = -(&inverse * &self.by_both);
@@ -285,7 +379,7 @@ impl FixedForm {
         let mut best: Vec<f64> = at_rest.iter().copied().collect();
         best[0] += self.focus;
         let range = |own: &Compensator| [-own.travel, own.travel];
-        let ranges = compensation.adjustments.iter().map(range).collect();
+        let ranges = adjustments.iter().map(range).collect();
         let travel = BoxedQuadratic::new(self.among_adjustments, ranges);
         let adjusted = Some(AdjustedForm { nominal: best, first: by_errors, travel });
         let second = ErrorProducts { combinations: self.combinations, among, own };

@@ -43,6 +43,7 @@ mod grade;
 mod groups;
 mod histogram;
 mod inverse;
+mod linear_contrast;
 mod loosest;
 mod made;
 mod merits;
@@ -59,6 +60,9 @@ mod sensitivity;
 mod spot;
 mod sweep;
 mod travel;
+mod two_planes;
+mod wave_beam;
+mod wave_effects;
 mod wavefront;
 mod waves;
 
@@ -72,7 +76,7 @@ pub use analysis::{
 pub use as_built::{AsBuiltGradient, FixedAndRefocused, as_built_gradient};
 pub use beam::{Beam, ColourRays, FieldBeam};
 pub use compensation::{Compensation, adjustments};
-pub use contrast::{ContrastChanges, ContrastSummary};
+pub use contrast::{ContrastChange, ContrastChanges, ContrastSummary};
 pub use covariance::{
     IndependentError, LeverArm, MadeKind, MadeNumber, NumberCovariance, TiltingBody,
     independent_errors,

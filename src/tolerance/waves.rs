@@ -1,42 +1,40 @@
 //! The wavefront of lenses with errors of making.
 //!
 //! The mean over all fields of the wavefront's variance at the primary wavelength, less piston and tilt,
-//! is a smooth function of an error and of the position of the image plane: second-order jets by both
-//! give its growth at the fixed image plane and, with the best position taken out, refocused. It is in
-//! squares of the primary wavelength; its root is the RMS wavefront.
+//! is a mean square over rays, as the spot is: a quadratic form of the errors with the derivatives of the
+//! wavefront of each ray, from one sweep back ([`super::wave_effects`]), at the fixed image plane and with
+//! all compensators adjusted within their travel. It is in squares of the primary wavelength; its root is
+//! the RMS wavefront.
 
-use super::merits::merits;
+use super::adjusted::Sensor;
+use super::compensation::adjustments;
+use super::effects::different_errors;
+use super::form::growth_shares;
 use super::sensitivity::Stages;
+use super::wave_beam::{ArrivedField, WaveBeam};
+use super::wave_effects::{WaveEffects, WaveNumbers};
 use super::{
-    Beam, Derivatives, FieldBeam, Jet2, MeritOptions, Merits, NominalLens, RealMerit,
-    RealMeritRequest, StopTest, ToleranceError, ToleranceScene, perturb, refuse_if_stopped,
+    Beam, Derivatives, Jet2, Merits, NominalLens, QuadraticForm, RealMerit, RealMeritRequest,
+    SecondDerivatives, StopTest, ToleranceError, ToleranceScene, form_spots, perturb,
+    refuse_if_stopped,
 };
-use crate::lens::{Lens, Perturbation, PerturbationKind, System, ToleranceSheet};
+use crate::lens::{Compensator, Lens, Perturbation, System, ToleranceSheet};
 use crate::math::{Dual, Real};
-use crate::pupil::RayModel;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
-
-/// A number with its first and second derivatives by two variables.
-type TwoJet = Dual<Dual<f64, 2>, 2>;
 
 /// The wavefront of a lens and what errors of making do to it.
 #[derive(Debug, Clone)]
 pub struct WavefrontModel {
-    /// The mean variance of the lens as designed at the fixed image plane and at its best position, in
-    /// squared waves.
-    pub nominal: [f64; 2],
-    /// That position, in mm from the image plane.
-    pub focus: f64,
-    /// The derivatives of the variance by each error at the fixed image plane and refocused, in squared
-    /// waves per unit and squared unit of the error.
-    pub errors: Vec<[Derivatives; 2]>,
-    judge: WavefrontJudge,
+    /// The mean variance in squared waves as a quadratic form of the errors, at the fixed image plane and
+    /// adjusted.
+    pub forms: [QuadraticForm; 2],
+    adjustments: Vec<Compensator>,
+    beam: WaveBeam,
 }
 
 impl WavefrontModel {
-    /// The wavefront of a lens at a zoom position with its tolerances. Each lens is refocused for its
-    /// least variance, whatever the travel; other compensators rest.
+    /// The wavefront of a lens at a zoom position with its tolerances; all compensators are adjusted for its
+    /// least variance.
     ///
     /// # Errors
     /// A lens that focuses nothing, a field without light at the primary wavelength, a ray that does not
@@ -44,43 +42,47 @@ impl WavefrontModel {
     pub fn new(
         (lens, zoom): (&Lens, usize),
         scene: &ToleranceScene,
-        sheet: &ToleranceSheet,
+        (sheet, second): (&ToleranceSheet, SecondDerivatives),
         stop: StopTest<'_>,
     ) -> Result<Self, ToleranceError> {
-        let options = wavefront_options(lens, zoom, scene)?;
-        let judge = WavefrontJudge { options, beam: primary_beam(&scene.beam, options.primary)? };
-        let focus = judge.best_plane(&scene.lens)?;
-        let focused = displaced(&scene.lens, focus);
-        let near = Stages::new(&scene.lens, &judge.beam, options)?;
-        let far = Stages::new(&focused, &judge.beam, options)?;
-        let mut different: Vec<Perturbation> = sheet.errors.iter().map(|t| t.error).collect();
-        different.sort_unstable();
-        different.dedup();
-        let one = |error: &Perturbation| {
-            refuse_if_stopped(stop)?;
-            let fixed: Jet2 = Jet2::variable(Dual::variable(0.0, 0), 0);
-            let fixed = near.merits(&scene.lens, options, &[(*error, fixed)])?.0;
-            let moved = [(*error, 0), (image_plane(&focused), 1)]
-                .map(|(what, i)| (what, TwoJet::variable(Dual::variable(0.0, i), i)));
-            let refocused = judge.mean(&far.merits(&focused, options, &moved)?.0);
-            Ok((*error, [judge.mean(&fixed).into(), without_focus(refocused)]))
-        };
-        let found: Vec<_> = different.par_iter().map(one).collect::<Result<_, ToleranceError>>()?;
-        let by_error: BTreeMap<Perturbation, [Derivatives; 2]> = found.into_iter().collect();
-        let of = |error| by_error.get(&error).copied().unwrap_or_default();
-        let nominal = [&scene.lens, &focused]
-            .map(|lens| Ok(judge.mean(&merits(&lens.systems, &judge.beam, options)?)));
-        let [fixed, refocused]: [Result<f64, ToleranceError>; 2] = nominal;
-        Ok(Self {
-            nominal: [fixed?, refocused?],
-            focus,
-            errors: sheet.errors.iter().map(|t| of(t.error)).collect(),
-            judge,
+        let beam = WaveBeam::new((lens, zoom), scene)?;
+        let arrived = beam.trace(&scene.lens.systems)?;
+        let focus = best_plane(&beam, &arrived);
+        let numbers = WaveNumbers::new(scene, sheet)?;
+        let effects = WaveEffects::new((scene, &beam), &numbers, (&arrived, focus), stop)?;
+        let [mut near, mut best] = effects.planes;
+        if second == SecondDerivatives::Traced {
+            let errors: Vec<Perturbation> = sheet.errors.iter().map(|own| own.error).collect();
+            near.exact = Some(second_derivatives((scene, &beam), &errors, 0.0, stop)?);
+            best.exact = Some(second_derivatives((scene, &beam), &errors, focus, stop)?);
+        }
+        let adjustments = adjustments(sheet);
+        Ok(Self { forms: [near.fixed(), best.adjusted(&adjustments)], adjustments, beam })
+    }
+
+    /// The variance of the lens as designed in squared waves, at the fixed image plane and adjusted.
+    pub fn nominal(&self) -> [f64; 2] {
+        self.forms.each_ref().map(QuadraticForm::as_designed)
+    }
+
+    /// The displacement of the image plane of the lens as designed in mm.
+    pub fn focus(&self) -> f64 {
+        let adjusted = self.forms[1].adjusted.as_ref();
+        adjusted.and_then(|own| own.as_designed().first().copied()).unwrap_or_default()
+    }
+
+    /// The derivatives of the variance by an error at the fixed image plane and adjusted, in squared waves
+    /// per unit and squared unit of the error.
+    pub fn derivatives(&self, error: usize) -> [Derivatives; 2] {
+        self.forms.each_ref().map(|form| Derivatives {
+            value: form.nominal,
+            first: form.first[error],
+            second: form.second.of(error, error),
         })
     }
 
-    /// The variance of lenses with random errors by their rays, in squared waves: as the model has it, each
-    /// refocused for its own least variance, other compensators at rest.
+    /// The variance of lenses with random errors by their rays, in squared waves. Each is adjusted as the form
+    /// has it, within the travel of the compensators, and then refocused for its own least variance.
     ///
     /// # Errors
     /// Correlations that no errors can have, an error of making that is not possible, and
@@ -92,181 +94,156 @@ impl WavefrontModel {
         request: RealMeritRequest,
         stop: StopTest<'_>,
     ) -> Result<RealMerit, ToleranceError> {
-        RealMerit::new(sheet, request, stop, |errors| {
-            self.judge.lens((&scene.lens, self.focus), errors)
-        })
+        RealMerit::new(sheet, request, stop, |errors| self.lens(&scene.lens, errors))
     }
 
-    /// The growth of the expected variance by each error alone, in squared waves, at the fixed image
-    /// plane and refocused.
-    pub fn growth(&self, sheet: &ToleranceSheet) -> Vec<[f64; 2]> {
-        let pairs = sheet.errors.iter().zip(&self.errors);
-        let half = |deviation: f64| 0.5 * deviation * deviation;
-        pairs.map(|(t, by)| by.map(|by| half(t.deviation()) * by.second)).collect()
-    }
-
-    /// The share of each error in the sum of these.
-    pub fn growth_shares(&self, sheet: &ToleranceSheet) -> Vec<[f64; 2]> {
-        let growth = self.growth(sheet);
-        let total = |i: usize| growth.iter().map(|by| by[i]).sum::<f64>().abs();
-        let totals = [0, 1].map(|i| total(i).max(f64::MIN_POSITIVE));
-        growth.iter().map(|by| [by[0] / totals[0], by[1] / totals[1]]).collect()
+    /// The share of each error in the growth of the expected variance, at the fixed image plane and adjusted;
+    /// correlated errors share what they do together.
+    ///
+    /// # Errors
+    /// Correlations that no errors can have.
+    pub fn growth_shares(&self, sheet: &ToleranceSheet) -> Result<Vec<[f64; 2]>, ToleranceError> {
+        growth_shares(&self.forms, sheet)
     }
 
     /// The root of the expected variance of lenses that are made in waves, at the fixed image plane and
-    /// refocused: errors count as independent.
-    pub fn expected_rms(&self, sheet: &ToleranceSheet) -> [f64; 2] {
-        let growth = self.growth(sheet);
-        [0, 1].map(|i| {
-            let sum: f64 = growth.iter().map(|by| by[i]).sum();
-            (self.nominal[i] + sum).max(0.0).sqrt()
-        })
-    }
-}
-
-/// The distance of an exit pupil at infinity in mm.
-const FAR: f64 = 1e6;
-
-/// The reference sphere of a lens: through the centre of its paraxial exit pupil.
-fn wavefront_options(
-    lens: &Lens,
-    zoom: usize,
-    scene: &ToleranceScene,
-) -> Result<MeritOptions, ToleranceError> {
-    let model =
-        RayModel::from_lens(lens, zoom).map_err(|why| ToleranceError::Other(why.to_string()))?;
-    let first_order = &model.first_order;
-    if first_order.efl.is_none() {
-        let text = "the lens focuses nothing, so that its wavefront has no reference sphere; \
-                    expected a lens with a focal length";
-        return Err(ToleranceError::Other(text.to_owned()));
-    }
-    let primary = scene.lens.primary;
-    let vertices = scene.lens.systems[primary].vertex_positions();
-    let last = vertices.get(vertices.len().saturating_sub(2)).copied().unwrap_or_default();
-    let pupil = first_order.exit_pupil.position.map_or(-FAR, |position| last + position);
-    let um = scene.lens.wavelengths[primary];
-    Ok(MeritOptions { primary, wavefront: Some((pupil, um * 1e-3)) })
-}
-
-/// The rays of the primary wavelength alone.
-fn primary_beam(beam: &Beam, primary: usize) -> Result<Beam, ToleranceError> {
-    let of_field = |(number, field): (usize, &FieldBeam)| {
-        let own = field.colours.iter().filter(|colour| colour.wavelength == primary);
-        let colours: Vec<_> = own.cloned().collect();
-        if colours.is_empty() {
-            let text = format!("no light of field {} at the primary wavelength", number + 1);
-            return Err(ToleranceError::Other(text));
-        }
-        Ok(FieldBeam { colours, ..field.clone() })
-    };
-    let fields = beam.fields.iter().enumerate().map(of_field).collect::<Result<_, _>>()?;
-    Ok(Beam { fields })
-}
-
-/// The gap in front of the image plane.
-fn image_plane(lens: &NominalLens) -> Perturbation {
-    let last = lens.systems[lens.primary].surfaces.len().saturating_sub(2);
-    Perturbation::of_surface(PerturbationKind::Thickness, last)
-}
-
-fn displaced(lens: &NominalLens, distance: f64) -> NominalLens {
-    let mut lens = lens.clone();
-    let last = image_plane(&lens).first;
-    for system in &mut lens.systems {
-        system.surfaces[last].thickness += distance;
-    }
-    lens
-}
-
-/// The derivatives by the first variable at the best value of the second one.
-fn without_focus(jet: TwoJet) -> Derivatives {
-    let value = jet.value.value;
-    let [first, by_plane] = [0, 1].map(|i| jet.value.slope[i]);
-    let second = |i: usize, j: usize| jet.slope[i].slope[j];
-    let (both, bend) = (second(0, 1), second(1, 1));
-    if !(bend > 0.0) {
-        return Derivatives { value, first, second: second(0, 0) };
-    }
-    Derivatives {
-        value: value - 0.5 * by_plane * by_plane / bend,
-        first: first - by_plane * both / bend,
-        second: second(0, 0) - both * both / bend,
-    }
-}
-
-/// The rays by which wavefronts are judged.
-#[derive(Debug, Clone)]
-struct WavefrontJudge {
-    options: MeritOptions,
-    beam: Beam,
-}
-
-/// Steps to the best image plane: the variance is nearly a quadratic function of its position.
-const STEPS: usize = 4;
-/// The same for a lens with errors, which begins near it.
-const LENS_STEPS: usize = 2;
-
-impl WavefrontJudge {
-    /// The mean variance over all fields.
-    fn mean<R: Real>(&self, merits: &Merits<R>) -> R {
-        let weighted = merits.wavefronts.iter().zip(&self.beam.fields);
-        weighted.fold(R::ZERO, |sum, (wavefront, field)| {
-            sum + wavefront.tilt_removed * R::from_f64(field.weight)
-        })
+    /// adjusted; where the travel of a compensator has an end, that of random lenses by the form.
+    ///
+    /// # Errors
+    /// Correlations that no errors can have.
+    pub fn expected_rms(&self, sheet: &ToleranceSheet) -> Result<[f64; 2], ToleranceError> {
+        let [fixed, adjusted] = self.forms.each_ref().map(|form| expected(form, sheet));
+        Ok([fixed?, adjusted?].map(|variance| variance.max(0.0).sqrt()))
     }
 
-    /// The variance of a lens with errors at its image plane, and at its own best one, which is looked for from
-    /// a displacement; `None` if a ray does not arrive.
+    /// The variance of a lens with errors at its image plane and adjusted; `None` if a ray does not arrive.
     fn lens(
         &self,
-        (lens, focus): (&NominalLens, f64),
+        lens: &NominalLens,
         errors: &[(Perturbation, f64)],
     ) -> Result<Option<[f64; 2]>, ToleranceError> {
-        let arrived = |found: Result<f64, ToleranceError>| match found {
+        let traced = |systems: &[System<f64>]| match self.beam.trace(systems) {
             Err(ToleranceError::RayLost { .. }) => Ok(None),
-            other => other.map(Some),
+            found => found.map(Some),
         };
-        let systems = perturb(lens, errors)?;
-        let judged = merits(&systems, &self.beam, self.options);
-        let Some(fixed) = arrived(judged.map(|own| self.mean(&own)))? else { return Ok(None) };
-        let mut focus = focus;
-        let mut least = fixed;
-        for _ in 0..LENS_STEPS {
-            let mut moved: Vec<System<Jet2>> = systems.iter().map(System::cast).collect();
-            let last = image_plane(lens).first;
-            let variable = Jet2::variable(Dual::variable(0.0, 0), 0);
-            let shift = Jet2::from_f64(focus) + variable;
-            moved.iter_mut().for_each(|system| system.surfaces[last].thickness += shift);
-            let judged = match merits(&moved, &self.beam, self.options) {
-                Err(ToleranceError::RayLost { .. }) => return Ok(None),
-                judged => judged?,
-            };
-            let Derivatives { value, first, second } = self.mean(&judged).into();
-            if !(second > 0.0) {
-                least = least.min(value);
-                break;
-            }
-            focus -= first / second;
-            least = value - 0.5 * first * first / second;
-        }
-        Ok(Some([fixed, least.max(0.0)]))
+        let Some(arrived) = traced(&perturb(lens, errors)?)? else { return Ok(None) };
+        let fixed = self.beam.variance(&arrived, &vec![0.0; arrived.len()]);
+        let Some(adjusted) = &self.forms[1].adjusted else { return Ok(Some([fixed; 2])) };
+        let values: Vec<f64> = errors.iter().map(|(_, value)| *value).collect();
+        let positions = adjusted.with_errors(&values);
+        let moved = self.adjustments.iter().zip(&positions);
+        let moved: Vec<_> =
+            moved.filter_map(|(own, position)| Some((own.part.in_lens()?, *position))).collect();
+        let arrived = if moved.is_empty() {
+            Some(arrived)
+        } else {
+            let all: Vec<_> = errors.iter().copied().chain(moved).collect();
+            traced(&perturb(lens, &all)?)?
+        };
+        Ok(arrived.map(|arrived| [fixed, self.refocused(&arrived, positions)]))
     }
 
-    /// The displacement of the image plane in mm at which the mean variance is least.
-    fn best_plane(&self, lens: &NominalLens) -> Result<f64, ToleranceError> {
-        let mut focus = 0.0;
-        for _ in 0..STEPS {
-            let lens = displaced(lens, focus);
-            let stages = Stages::new(&lens, &self.beam, self.options)?;
-            let plane = [(image_plane(&lens), Jet2::variable(Dual::variable(0.0, 0), 0))];
-            let found: Derivatives =
-                self.mean(&stages.merits(&lens, self.options, &plane)?.0).into();
+    /// The least variance of a lens with its compensators in some positions over those of the focus.
+    fn refocused(&self, arrived: &[ArrivedField<f64>], mut positions: Vec<f64>) -> f64 {
+        let jets: Vec<_> = arrived.iter().map(|field| field.map(Jet2::from_f64)).collect();
+        let travel = self.adjustments[0].travel;
+        let at = |positions: &[f64]| -> Derivatives {
+            let sensor = Sensor::new(&self.adjustments, positions);
+            let shift = |field: &ArrivedField<f64>| {
+                let [x, y, u, v, _] = field.chief();
+                let ([_, _, z], advance) = sensor.meet(&[x, y, u, v]);
+                Jet2::from_f64(z)
+                    + Jet2::from_f64(advance) * Jet2::variable(Dual::variable(0.0, 0), 0)
+            };
+            let shifts: Vec<Jet2> = arrived.iter().map(shift).collect();
+            self.beam.variance(&jets, &shifts).into()
+        };
+        let mut found = at(&positions);
+        for _ in 0..LENS_STEPS {
             if !(found.second > 0.0) {
                 break;
             }
-            focus -= found.first / found.second;
+            let mut next = positions.clone();
+            next[0] = (next[0] - found.first / found.second).clamp(-travel, travel);
+            let better = at(&next);
+            if !(better.value < found.value) {
+                break;
+            }
+            (positions, found) = (next, better);
         }
-        Ok(focus)
+        found.value
     }
+}
+
+/// The expectation of a form; of random lenses where it is no quadratic one.
+fn expected(form: &QuadraticForm, sheet: &ToleranceSheet) -> Result<f64, ToleranceError> {
+    if !form.has_stops() {
+        return form.expectation(sheet);
+    }
+    let lenses = form_spots(form, sheet, SEED)?;
+    Ok(lenses.iter().map(|rms| rms * rms).sum::<f64>() / lenses.len().max(1) as f64)
+}
+
+/// The seed of random lenses by a form.
+const SEED: u64 = 0xA7E5;
+/// Steps to the best image plane: the variance is nearly a quadratic function of its position.
+const STEPS: usize = 5;
+/// The same for a lens with errors, which begins near it.
+const LENS_STEPS: usize = 2;
+
+/// The displacement of the image plane in mm at which the mean variance is least.
+fn best_plane(beam: &WaveBeam, arrived: &[ArrivedField<f64>]) -> f64 {
+    let jets: Vec<_> = arrived.iter().map(|field| field.map(Jet2::from_f64)).collect();
+    let mut focus = 0.0;
+    for _ in 0..STEPS {
+        let shift = Jet2::variable(Dual::variable(focus, 0), 0);
+        let found: Derivatives = beam.variance(&jets, &vec![shift; jets.len()]).into();
+        if !(found.second > 0.0) {
+            break;
+        }
+        focus -= found.first / found.second;
+    }
+    focus
+}
+
+/// The second derivatives of the variance by each error at an image plane that is displaced, those of rays by
+/// errors included: by second-order jets, once for each different error.
+fn second_derivatives(
+    (scene, beam): (&ToleranceScene, &WaveBeam),
+    errors: &[Perturbation],
+    plane: f64,
+    stop: StopTest<'_>,
+) -> Result<Vec<f64>, ToleranceError> {
+    let mut lens = scene.lens.clone();
+    for system in &mut lens.systems {
+        let last = system.surfaces.len().saturating_sub(2);
+        system.surfaces[last].thickness += plane;
+    }
+    let options = beam.options();
+    let rays = primary_rays(scene);
+    let stages = Stages::new(&lens, &rays, options)?;
+    let (different, places) = different_errors(errors);
+    let mean = |merits: &Merits<Jet2>| {
+        let fields = merits.wavefronts.iter().zip(&rays.fields);
+        fields.fold(Jet2::ZERO, |sum, (wavefront, field)| {
+            sum + wavefront.tilt_removed * Jet2::from_f64(field.weight)
+        })
+    };
+    let one = |error: &Perturbation| {
+        refuse_if_stopped(stop)?;
+        let variable = Jet2::variable(Dual::variable(0.0, 0), 0);
+        let merits = stages.merits(&lens, options, &[(*error, variable)])?.0;
+        Ok(Derivatives::from(mean(&merits)).second)
+    };
+    let found: Vec<f64> = different.par_iter().map(one).collect::<Result<_, ToleranceError>>()?;
+    Ok(places.iter().map(|place| found[*place]).collect())
+}
+
+/// The rays of the primary wavelength alone.
+fn primary_rays(scene: &ToleranceScene) -> Beam {
+    let mut beam = scene.beam.clone();
+    for field in &mut beam.fields {
+        field.colours.retain(|colour| colour.wavelength == scene.lens.primary);
+    }
+    beam
 }

@@ -34,7 +34,7 @@ mod surface_parameter;
 
 pub use crate::math::SimdWidth;
 pub use adjoint::{
-    AdjointSeed, ErrorDirections, ErrorNumber, ErrorRows, ErrorSlopes, SurfaceGradient,
+    AdjointSeed, ErrorDirections, ErrorNumber, ErrorPaths, ErrorRows, ErrorSlopes, SurfaceGradient,
     SystemGradient,
 };
 pub use batch::{ImagePoints, Landings, Rays, TraceSink};

@@ -7,8 +7,9 @@ use crate::cli::output::{ShortNumber, TextTable};
 use crate::lens::{Lens, TableUnit, ToleranceSheet};
 use crate::report::FurtherColumns;
 use crate::tolerance::{
-    ContrastChanges, ContrastSummary, KindShare, PartShare, RealMerit, RealMeritRequest, StopTest,
-    ToleranceError, ToleranceScene, WavefrontModel, shares_by_kind, shares_by_part,
+    ContrastChanges, ContrastSummary, KindShare, PartShare, RealMerit, RealMeritRequest,
+    SecondDerivatives, StopTest, ToleranceError, ToleranceScene, WavefrontModel, shares_by_kind,
+    shares_by_part,
 };
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -61,6 +62,8 @@ struct WavefrontRow {
 struct ContrastRow {
     fixed: Option<[f64; 2]>,
     refocused: Option<[f64; 2]>,
+    /// The derivatives at the fixed image plane and adjusted, per unit of the error.
+    first: Option<[f64; 2]>,
 }
 
 impl FurtherMerits {
@@ -73,7 +76,9 @@ impl FurtherMerits {
         let request =
             RealMeritRequest { seed: arguments.seed, most: arguments.samples, error: ENOUGH };
         let wavefront = || {
-            let model = WavefrontModel::new((lens, arguments.zoom), scene, sheet, stop)?;
+            let place = (lens, arguments.zoom);
+            let model =
+                WavefrontModel::new(place, scene, (sheet, SecondDerivatives::Traced), stop)?;
             let real = model.real_lenses(scene, sheet, request, stop)?;
             Ok((model, real))
         };
@@ -88,20 +93,24 @@ impl FurtherMerits {
         let mut rows: Vec<FurtherRow> =
             sheet.errors.iter().map(|_| FurtherRow::default()).collect();
         if let Some((model, _)) = &wavefront {
-            add_wavefronts(&mut rows, model, sheet);
+            add_wavefronts(&mut rows, model, sheet)?;
         }
         if let Some((found, _)) = &contrast {
             for (row, changes) in rows.iter_mut().zip(&found.changes) {
-                let of = |plane: usize| changes.map(|changes| changes[plane]);
-                row.mtf = Some(ContrastRow { fixed: of(0), refocused: of(1) });
+                let of = |plane: usize| changes.map(|changes| changes.ends[plane]);
+                let first = changes.map(|changes| changes.first);
+                row.mtf = Some(ContrastRow { fixed: of(0), refocused: of(1), first });
             }
         }
-        let wavefront = wavefront.map(|(model, real)| WavefrontSummary {
-            nominal_rms: model.nominal.map(|variance| variance.max(0.0).sqrt()),
-            expected_rms: model.expected_rms(sheet),
-            focus: model.focus,
-            real: real.root(),
-        });
+        let summary = |(model, real): (WavefrontModel, RealMerit)| {
+            Ok::<_, ToleranceError>(WavefrontSummary {
+                nominal_rms: model.nominal().map(|variance| variance.max(0.0).sqrt()),
+                expected_rms: model.expected_rms(sheet)?,
+                focus: model.focus(),
+                real: real.root(),
+            })
+        };
+        let wavefront = wavefront.map(summary).transpose()?;
         let mtf = contrast.map(|(found, real)| found.summary(sheet, real));
         Ok(Self { wavefront, mtf, rows, is_stopped })
     }
@@ -133,9 +142,8 @@ impl FurtherMerits {
                 ));
             }
         }
-        let is_asked = self.wavefront.is_some() || self.mtf.is_some();
-        if is_asked && !sheet.correlations.is_empty() {
-            let text = "the expected wavefront and contrast count correlated errors as independent";
+        if self.mtf.is_some() && !sheet.correlations.is_empty() {
+            let text = "the expected contrast counts correlated errors as independent";
             warnings.push(text.to_owned());
         }
         warnings
@@ -163,7 +171,8 @@ impl FurtherMerits {
                      wavefront_refocused_second (waves^2/unit^2),wavefront_refocused_share";
         }
         if self.mtf.is_some() {
-            head += ",mtf_fixed_low,mtf_fixed_high,mtf_refocused_low,mtf_refocused_high";
+            head += ",mtf_fixed_low,mtf_fixed_high,mtf_refocused_low,mtf_refocused_high,\
+                     mtf_fixed_first (1/unit),mtf_refocused_first (1/unit)";
         }
         head
     }
@@ -186,7 +195,8 @@ impl FurtherRow {
             let (first, second) = (part.by.first / factor, part.by.second / (factor * factor));
             format!(",{first},{second},{}", part.share)
         };
-        let changes = self.mtf.iter().flat_map(|own| [own.fixed, own.refocused]);
+        let first = |own: &ContrastRow| own.first.map(|own| own.map(|by| by / factor));
+        let changes = self.mtf.iter().flat_map(|own| [own.fixed, own.refocused, first(own)]);
         let ends = |ends: Option<[f64; 2]>| {
             ends.map_or(",,".to_owned(), |[low, high]| format!(",{low},{high}"))
         };
@@ -203,12 +213,18 @@ fn unless_stopped<T>(
     }
 }
 
-fn add_wavefronts(rows: &mut [FurtherRow], model: &WavefrontModel, sheet: &ToleranceSheet) {
-    let shares = model.growth_shares(sheet);
-    for (row, (by, shares)) in rows.iter_mut().zip(model.errors.iter().zip(&shares)) {
+fn add_wavefronts(
+    rows: &mut [FurtherRow],
+    model: &WavefrontModel,
+    sheet: &ToleranceSheet,
+) -> Result<(), ToleranceError> {
+    let shares = model.growth_shares(sheet)?;
+    for (i, (row, shares)) in rows.iter_mut().zip(&shares).enumerate() {
+        let by = model.derivatives(i);
         let share = |i: usize| ShareOfGrowth { by: by[i], share: shares[i] };
         row.wavefront = Some(WavefrontRow { fixed: share(0), refocused: share(1) });
     }
+    Ok(())
 }
 
 impl Display for FurtherMerits {

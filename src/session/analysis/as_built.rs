@@ -104,6 +104,15 @@ pub(super) fn confirm_unless(
     unless_stopped(as_built(lens, settings, (settings.tolerance, REAL_LENSES), stop))
 }
 
+/// The root of the variance of the wavefront as designed and as it is expected, in waves.
+fn root_variances(
+    waves: &WavefrontModel,
+    sheet: &ToleranceSheet,
+) -> Result<[[f64; 2]; 2], ToleranceError> {
+    let nominal = waves.nominal().map(|variance| variance.max(0.0).sqrt());
+    Ok([nominal, waves.expected_rms(sheet)?])
+}
+
 fn as_built(
     lens: &Lens,
     settings: &AnalysisSettings,
@@ -126,7 +135,11 @@ fn as_built(
     });
     let worst = worst_lens((lens, settings.zoom), &scene, &sheet, &analysis.real);
     let waves = (samples > 0)
-        .then(|| WavefrontModel::new((lens, settings.zoom), &scene, &sheet, stop).ok())
+        .then(|| {
+            let place = (lens, settings.zoom);
+            let sheet = (&sheet, SecondDerivatives::Traced);
+            WavefrontModel::new(place, &scene, sheet, stop).ok()
+        })
         .flatten();
     let request = RealMeritRequest { seed: SEED, most: REAL_LENSES, error: ENOUGH };
     let real_wavefront =
@@ -141,10 +154,8 @@ fn as_built(
     Ok(AsBuiltLens {
         contrast,
         real_wavefront: real_wavefront.map(|real| real.root()),
-        wavefront: waves.as_ref().map(|waves| {
-            [waves.nominal.map(|variance| variance.max(0.0).sqrt()), waves.expected_rms(&sheet)]
-        }),
-        wavefront_shares: waves.map_or_else(Vec::new, |waves| waves.growth_shares(&sheet)),
+        wavefront: waves.as_ref().map(|waves| root_variances(waves, &sheet)).transpose()?,
+        wavefront_shares: waves.map_or(Ok(Vec::new()), |waves| waves.growth_shares(&sheet))?,
         shares: analysis.growth_shares(&sheet)?,
         sheet,
         from_lens: lens.tolerances.is_some(),

@@ -123,14 +123,14 @@ pub struct ErrorDirections {
 }
 
 /// The number of rays that are traced back at once.
-const LANES: usize = 16;
+pub(super) const LANES: usize = 16;
 
 /// A number with its derivative along an error.
 type ErrorDual = Dual<f64, 1>;
 
 /// Vectors of some rays, as columns.
 #[derive(Clone, Copy)]
-struct Vectors<R> {
+pub(super) struct Vectors<R> {
     x: [R; LANES],
     y: [R; LANES],
     z: [R; LANES],
@@ -142,28 +142,44 @@ impl<R: ErrorReal> Vectors<R> {
     }
 
     #[inline(always)]
-    fn get(&self, j: usize) -> Vec3<R> {
+    pub(super) fn get(&self, j: usize) -> Vec3<R> {
         Vec3::new(self.x[j], self.y[j], self.z[j])
     }
 
     #[inline(always)]
-    fn set(&mut self, j: usize, v: Vec3<R>) {
+    pub(super) fn set(&mut self, j: usize, v: Vec3<R>) {
         (self.x[j], self.y[j], self.z[j]) = (v.x, v.y, v.z);
+    }
+
+    /// The differences from other vectors.
+    #[inline(always)]
+    pub(super) fn less(&self, other: &Self) -> Self {
+        let mut less = *self;
+        for j in 0..LANES {
+            less.set(j, self.get(j) - other.get(j));
+        }
+        less
+    }
+
+    /// The parts along the axis.
+    #[inline(always)]
+    pub(super) fn along_axis(&self) -> [R; LANES] {
+        self.z
     }
 }
 
 /// Some rays in one place, or the derivatives by them.
 #[derive(Clone, Copy)]
-struct RayColumns<R> {
-    point: Vectors<R>,
-    k: Vectors<R>,
+pub(super) struct RayColumns<R> {
+    pub(super) point: Vectors<R>,
+    pub(super) k: Vectors<R>,
 }
 
 /// Some rays at a surface, in its frame.
 #[derive(Clone, Copy)]
-struct HitColumns<R> {
-    at: RayColumns<R>,
-    s: [R; LANES],
+pub(super) struct HitColumns<R> {
+    pub(super) at: RayColumns<R>,
+    pub(super) s: [R; LANES],
     a_behind: [R; LANES],
 }
 
@@ -189,10 +205,10 @@ impl<R: ErrorReal> HitColumns<R> {
 
 /// The errors of a surface for some rays: those of [`ErrorNumber`] in order, then those of the gap and
 /// of the index in front.
-struct ErrorColumns([[f64; LANES]; ErrorNumber::COUNT + 2]);
+pub(super) struct ErrorColumns([[f64; LANES]; ErrorNumber::COUNT + 2]);
 
 impl ErrorColumns {
-    const NONE: Self = Self([[0.0; LANES]; ErrorNumber::COUNT + 2]);
+    pub(super) const NONE: Self = Self([[0.0; LANES]; ErrorNumber::COUNT + 2]);
 
     #[inline(always)]
     fn get(&self, j: usize) -> SurfaceErrors {
@@ -240,30 +256,30 @@ impl ErrorColumns {
 
 /// The rays of one group of lanes: the first and how many.
 #[derive(Clone, Copy)]
-struct Lane {
-    from: usize,
-    count: usize,
+pub(super) struct Lane {
+    pub(super) from: usize,
+    pub(super) count: usize,
 }
 
 /// Some rays on their way to the image, as an earlier trace found them.
-struct TracedLanes {
-    lane: Lane,
+pub(super) struct TracedLanes {
+    pub(super) lane: Lane,
     start: RayColumns<f64>,
     /// The distance to each surface.
     distances: Vec<[f64; LANES]>,
 }
 
 /// The adjoint of some rays at a surface.
-struct AdjointColumns<R> {
-    by: RayColumns<R>,
-    numbers: [[R; LANES]; ErrorNumber::COUNT],
+pub(super) struct AdjointColumns<R> {
+    pub(super) by: RayColumns<R>,
+    pub(super) numbers: [[R; LANES]; ErrorNumber::COUNT],
     by_gap: [R; LANES],
     by_index_before: [R; LANES],
     by_terms: [[R; LANES]; ASPHERE_TERMS],
 }
 
 impl<R: ErrorReal> AdjointColumns<R> {
-    fn zero() -> Self {
+    pub(super) fn zero() -> Self {
         let zero = [R::ZERO; LANES];
         Self {
             by: RayColumns { point: Vectors::zero(), k: Vectors::zero() },
@@ -276,7 +292,7 @@ impl<R: ErrorReal> AdjointColumns<R> {
 
     /// Passes a surface; the last one only ends rays.
     #[inline(always)]
-    fn pass(
+    pub(super) fn pass(
         &mut self,
         interface: &Interface<f64>,
         errors: &ErrorColumns,
@@ -430,7 +446,7 @@ impl Tracer<f64> {
     }
 
     /// Visits the rays in groups, each traced to the image.
-    fn visit_lanes(&self, rays: &Rays<f64>, mut visit: impl FnMut(&TracedLanes)) {
+    pub(super) fn visit_lanes(&self, rays: &Rays<f64>, mut visit: impl FnMut(&TracedLanes)) {
         if !self.has_error_slopes() {
             return;
         }
@@ -473,13 +489,13 @@ impl Tracer<f64> {
     }
 
     /// Room for rays at each surface, which every group overwrites.
-    fn empty_tape<R: ErrorReal>(&self) -> Vec<HitColumns<R>> {
+    pub(super) fn empty_tape<R: ErrorReal>(&self) -> Vec<HitColumns<R>> {
         vec![HitColumns::zero(); self.surfaces()]
     }
 
     /// Takes rays to the image, and stores them at each surface.
     #[inline(always)]
-    fn record<R: ErrorReal>(
+    pub(super) fn record<R: ErrorReal>(
         &self,
         traced: &TracedLanes,
         errors: impl Fn(usize) -> ErrorColumns,
@@ -594,7 +610,7 @@ impl AdjointColumns<f64> {
 
 /// Adds the numbers of some rays to a row.
 #[inline(always)]
-fn add_lanes(row: &mut [f64], lanes: &[f64; LANES], Lane { from, count }: Lane) {
+pub(super) fn add_lanes(row: &mut [f64], lanes: &[f64; LANES], Lane { from, count }: Lane) {
     row[from..from + count].iter_mut().zip(lanes).for_each(|(to, by)| *to += by);
 }
 

@@ -16,12 +16,14 @@
 //! [`super::interface`]; the cost does not depend on the number of parameters.
 
 mod block;
+mod error_paths;
 mod errors;
 mod grin;
 mod mounted;
 mod refraction;
 mod sag_crossing;
 
+pub use error_paths::ErrorPaths;
 pub use errors::{ErrorDirections, ErrorNumber, ErrorRows, ErrorSlopes};
 
 use super::batch::{BLOCK, CHUNK, Landings, RayBlock, Rays};

@@ -4,11 +4,15 @@ use crate::cli::{Scratch, done, done_json, refused};
 use crate::merit::bundled;
 use aplanat::analysis::polychromatic_geometric_mtf;
 use aplanat::lens::{
-    ErrorDistribution, Lens, Perturbation, PerturbationKind, Tolerance, ToleranceSheet,
+    AdjustedPart, Compensator, ErrorDistribution, Lens, Perturbation, PerturbationKind, Tolerance,
+    ToleranceSheet,
 };
+use aplanat::math::{Dual, Real};
 use aplanat::pupil::{Accuracy, RayModel};
 use aplanat::tolerance::{
-    ContrastChanges, NominalLens, RealMeritRequest, ToleranceScene, WavefrontModel, perturb,
+    ContrastChanges, Derivatives, Jet2, MeritOptions, NominalLens, RealMeritRequest,
+    SecondDerivatives, ToleranceGrade, ToleranceScene, WavefrontModel, graded_sheet, merits,
+    perturb,
 };
 
 fn never() -> bool {
@@ -42,30 +46,102 @@ fn derivatives_of_the_wavefront_are_those_of_differences() {
         (PerturbationKind::Index, 0, 0, 2e-5),
         (PerturbationKind::ElementDecenterY, 2, 3, 2e-3),
     ]);
-    let model =
-        |scene: &ToleranceScene| WavefrontModel::new((&lens, 0), scene, &sheet, &never).unwrap();
-    let found = model(&scene);
-    assert!(found.nominal[1] <= found.nominal[0] && found.nominal[1] > 0.0, "{:?}", found.nominal);
+    let model = |scene: &ToleranceScene, second: SecondDerivatives| {
+        WavefrontModel::new((&lens, 0), scene, (&sheet, second), &never).unwrap()
+    };
+    let swept = model(&scene, SecondDerivatives::Neglected);
+    let found = model(&scene, SecondDerivatives::Traced);
+    let nominal = found.nominal();
+    assert!(nominal[1] <= nominal[0] && nominal[1] > 0.0, "{nominal:?}");
     for (i, tolerance) in sheet.errors.iter().enumerate() {
         let step = tolerance.half_range;
         let at = |value: f64| {
             let systems = perturb(&scene.lens, &[(tolerance.error, value)]).unwrap();
             let lens = NominalLens { systems, ..scene.lens.clone() };
-            model(&ToleranceScene { lens, ..scene.clone() }).nominal
+            let scene = ToleranceScene { lens, ..scene.clone() };
+            model(&scene, SecondDerivatives::Neglected).nominal()
         };
         let (low, high) = (at(-step), at(step));
         for plane in 0..2 {
-            let by = found.errors[i][plane];
+            let by = found.derivatives(i)[plane];
             let first = (high[plane] - low[plane]) / (2.0 * step);
-            let second = (high[plane] - 2.0 * found.nominal[plane] + low[plane]) / (step * step);
-            let scale = by.first.abs().max((found.nominal[plane] * by.second.abs()).sqrt());
+            let second = (high[plane] - 2.0 * nominal[plane] + low[plane]) / (step * step);
+            let scale = by.first.abs().max((nominal[plane] * by.second.abs()).sqrt());
             let what = (tolerance.error.kind, plane, by, first, second);
             assert!((by.first - first).abs() < 1e-3 * scale, "{what:?}");
             assert!((by.second - second).abs() < 0.02 * by.second.abs(), "{what:?}");
+            let without = swept.derivatives(i)[plane];
+            assert_eq!(without.first, by.first);
+            // The wavefront of 2.5 waves times its second derivative by an error.
+            assert!((without.second / by.second - 1.0).abs() < 0.15, "{what:?}");
         }
     }
-    let [fixed, refocused] = found.expected_rms(&sheet);
-    assert!(fixed > refocused && refocused >= found.nominal[1].sqrt(), "{fixed} {refocused}");
+    let [fixed, refocused] = found.expected_rms(&sheet).unwrap();
+    assert!(fixed > refocused && refocused >= nominal[1].sqrt(), "{fixed} {refocused}");
+}
+
+/// One sweep back and Fermat's principle tell of every error what a trace over numbers that carry its derivative
+/// tells: through mirrors, aspheres, cemented elements, and lenses without such a sweep.
+#[test]
+fn one_sweep_gives_the_derivatives_of_the_wavefront_by_every_error() {
+    for name in
+        ["double_gauss_rudolph_50", "telescope_rc_f8", "phone_us7558005_1", "grin_rod_melles_griot"]
+    {
+        let mut lens = bundled(name);
+        lens.fields.values.truncate(2);
+        let scene = ToleranceScene::new(&lens, 0, 0.2).unwrap();
+        let sheet = graded_sheet(&lens, &scene.lens, ToleranceGrade::Commercial);
+        let second = SecondDerivatives::Neglected;
+        let found = WavefrontModel::new((&lens, 0), &scene, (&sheet, second), &never).unwrap();
+        let model = RayModel::from_lens(&lens, 0).unwrap();
+        let vertices = scene.lens.systems[scene.lens.primary].vertex_positions();
+        let pupil = vertices[vertices.len() - 2] + model.first_order.exit_pupil.position.unwrap();
+        let wavefront = Some((pupil, 1e-3 * scene.lens.wavelengths[scene.lens.primary]));
+        let options = MeritOptions { primary: scene.lens.primary, wavefront };
+        for (i, tolerance) in sheet.errors.iter().enumerate().step_by(2) {
+            let variable = Jet2::variable(Dual::variable(0.0, 0), 0);
+            let systems = perturb(&scene.lens, &[(tolerance.error, variable)]).unwrap();
+            let exact = merits(&systems, &scene.beam, options).unwrap();
+            let fields = exact.wavefronts.iter().zip(&scene.beam.fields);
+            let mean = fields.fold(Jet2::ZERO, |sum, (own, field)| {
+                sum + own.tilt_removed * Jet2::from_f64(field.weight)
+            });
+            let (by, exact) = (found.derivatives(i)[0], Derivatives::from(mean));
+            let scale = exact.first.abs().max((exact.value * by.second).sqrt());
+            let what = (name, tolerance.error, by, exact);
+            // The rounding of paths of some metres.
+            assert!((by.value - exact.value).abs() < 1e-7 * exact.value, "{what:?}");
+            assert!((by.first - exact.first).abs() <= 1e-7 * scale, "{what:?}");
+        }
+    }
+}
+
+/// A focus of bounded travel leaves a part of the wavefront, in the form and in real lenses alike; a gap as a
+/// second compensator wins back what it makes.
+#[test]
+fn compensators_of_the_wavefront_have_stops() {
+    let lens = triplet();
+    let scene = ToleranceScene::new(&lens, 0, 0.05).unwrap();
+    let errors =
+        [(PerturbationKind::Curvature, 1, 1, 2e-6), (PerturbationKind::Thickness, 1, 1, 0.02)];
+    let request = RealMeritRequest { seed: 3, most: 64, error: 0.02 };
+    let second = SecondDerivatives::Neglected;
+    let judged = |sheet: &ToleranceSheet| {
+        let model = WavefrontModel::new((&lens, 0), &scene, (sheet, second), &never).unwrap();
+        let real = model.real_lenses(&scene, sheet, request, &never).unwrap();
+        let expected = model.expected_rms(sheet).unwrap()[1].powi(2);
+        let apart = (real.mean[1] - expected).abs();
+        assert!(apart < 4.0 * real.error[1] + 0.02 * expected, "{expected} {real:?}");
+        expected
+    };
+    let free = sheet(&errors);
+    let held = ToleranceSheet { focus_travel: Some(0.0), ..free.clone() };
+    let part =
+        AdjustedPart::Lens(Perturbation { kind: PerturbationKind::Thickness, first: 1, last: 1 });
+    let gap = Compensator { part, travel: f64::INFINITY };
+    let adjusted = ToleranceSheet { compensators: vec![gap], ..free.clone() };
+    let (free, held, adjusted) = (judged(&free), judged(&held), judged(&adjusted));
+    assert!(adjusted < free && free < 0.9 * held, "{adjusted} {free} {held}");
 }
 
 /// Errors that lie at the ends of their ranges: the mean variance of real lenses is that of the derivatives,
@@ -79,13 +155,14 @@ fn real_lenses_confirm_the_expected_wavefront() {
         (PerturbationKind::ElementTiltY, 0, 1, 5e-5),
         (PerturbationKind::Curvature, 1, 1, 2e-6),
     ]);
-    let model = WavefrontModel::new((&lens, 0), &scene, &sheet, &never).unwrap();
+    let second = SecondDerivatives::Neglected;
+    let model = WavefrontModel::new((&lens, 0), &scene, (&sheet, second), &never).unwrap();
     let real = |most: usize, error: f64| {
         let request = RealMeritRequest { seed: 3, most, error };
         model.real_lenses(&scene, &sheet, request, &never).unwrap()
     };
     let found = real(256, 0.02);
-    let expected = model.expected_rms(&sheet).map(|rms| rms * rms);
+    let expected = model.expected_rms(&sheet).unwrap().map(|rms| rms * rms);
     assert!(found.reached && found.lost == 0, "{found:?}");
     assert_eq!(found.differs_from(expected, 0.01), None, "{found:?} {expected:?}");
     assert!(found.differs_from(expected.map(|value| 1.5 * value), 0.01).is_some(), "{found:?}");
@@ -118,13 +195,48 @@ fn the_contrast_of_a_lens_with_errors_is_that_of_the_lens() {
     let scene = ToleranceScene::new(&lens, 0, 0.01).unwrap();
     let far = ContrastChanges::new((&lens, 0, 0.01), &scene, (&sheet, 1e6), &never).unwrap();
     assert!(found.sampling_error > 0.0 && far.sampling_error > 1e-3, "{}", far.sampling_error);
-    let [fixed, refocused] = found.changes[0].unwrap();
+    let [fixed, refocused] = found.changes[0].unwrap().ends;
     let mut longer = lens.clone();
     longer.surfaces[last].thickness += 0.1;
     let expected = contrast(&longer).nominal[0] - found.nominal[0];
     assert!((fixed[1] - expected).abs() < 2.0 * error, "{fixed:?} {expected}");
     assert!(refocused.iter().all(|change| change.abs() < 1e-6), "{refocused:?}");
     assert!(fixed.iter().any(|change| change.abs() > 0.01), "{fixed:?}");
+}
+
+/// The rays that move by their derivatives have the contrast of traced ones, at the fixed image plane and with
+/// focus and a gap adjusted; the derivative is that of small errors.
+#[test]
+fn the_contrast_by_one_sweep_is_that_of_traced_rays() {
+    let lens = triplet();
+    let scene = ToleranceScene::new(&lens, 0, 0.01).unwrap();
+    let gap = Perturbation { kind: PerturbationKind::Thickness, first: 1, last: 1 };
+    let compensator = Compensator { part: AdjustedPart::Lens(gap), travel: 0.05 };
+    let request = RealMeritRequest { seed: 3, most: 2, error: 0.0 };
+    let changes = |kind, first, last, half_range| {
+        let mut sheet = sheet(&[(kind, first, last, half_range)]);
+        sheet.compensators = vec![compensator];
+        let place = (&lens, 0, 0.01);
+        let sheet = (&sheet, 10.0);
+        let found = ContrastChanges::with_real_lenses(place, &scene, sheet, request, &never);
+        let (found, real) = found.unwrap();
+        (found.changes[0].unwrap(), [0, 1].map(|i| real.mean[i] - found.nominal[i]), real)
+    };
+    // Both ends are mirror images.
+    for kind in [PerturbationKind::ElementDecenterX, PerturbationKind::ElementTiltY] {
+        let half_range = if kind == PerturbationKind::ElementTiltY { 2e-3 } else { 0.05 };
+        let (found, real, _) = changes(kind, 2, 3, half_range);
+        for plane in 0..2 {
+            let [low, high] = found.ends[plane];
+            let what = (kind, found, real);
+            assert!(low.abs() > 0.005 && (high - low).abs() < 1e-9, "{what:?}");
+            assert!((real[plane] / low - 1.0).abs() < 0.03, "{what:?}");
+            assert!(found.first[plane].abs() * half_range < 1e-6, "{what:?}");
+        }
+    }
+    let (small, ..) = changes(PerturbationKind::Curvature, 1, 1, 1e-7);
+    let [low, high] = small.ends[0];
+    assert!((small.first[0] * 2e-7 / (high - low) - 1.0).abs() < 1e-3, "{small:?}");
 }
 
 const SINGLET: &str = r#"{ "aplanat": 1, "name": "Singlet", "object": "infinity",
@@ -213,7 +325,7 @@ fn the_command_draws_and_groups() {
     ] {
         assert!((number_of(cell) - exact).abs() <= 1e-12 * exact.abs(), "{cell} {exact}");
     }
-    assert!(table.lines().all(|line| columns(line) == 13 + 6 + 4), "{table}");
+    assert!(table.lines().all(|line| columns(line) == 13 + 6 + 6), "{table}");
     assert!(std::fs::read(png.path()).unwrap().starts_with(b"\x89PNG"));
     let drawn = ["--plot", svg.path(), "--second-derivatives"];
     let text = done(&[&few[..], &drawn].concat(), "");
