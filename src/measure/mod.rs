@@ -27,6 +27,8 @@ mod spot;
 mod term_cost;
 mod timing;
 mod tolerance;
+mod tolerance_cases;
+mod tolerance_reference;
 mod trace;
 
 pub use accuracy::{AccuracyPoint, point_spread_accuracy, transfer_accuracy};
@@ -65,5 +67,9 @@ pub use timing::{RateStatistics, Stopwatch, time_ms};
 pub use tolerance::{
     AsBuiltComparison, AsBuiltCost, MadeDesign, ToleranceBenchmark, ToleranceBenchmarkError,
     compare_as_built, measure_tolerances,
+};
+pub use tolerance_cases::{MeritSweepCost, PoseCost};
+pub use tolerance_reference::{
+    AgreementRow, ReferenceAgreement, ReferenceLens, ToleranceReference,
 };
 pub use trace::{BenchmarkError, Throughput, TraceRow, measure_throughput};

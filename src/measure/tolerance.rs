@@ -2,6 +2,7 @@
 //! optimized as it is built.
 
 use super::timing::{TimedCase, time_interleaved, time_median};
+use super::tolerance_cases::{MeritSweepCost, PoseCost, filled_sheet, merit_sweep_cost, pose_cost};
 use super::trace::BenchmarkError;
 use crate::lens::{
     Lens, ParameterKind, Perturbation, PerturbationKind, Tolerance, ToleranceGrade, ToleranceSheet,
@@ -65,6 +66,10 @@ pub struct ToleranceBenchmark {
     pub samples_ms: f64,
     /// The cost of gradients.
     pub gradients: Vec<AsBuiltCost>,
+    /// The cost of other merits than the spot; `None` for a lens that has none.
+    pub merits: Option<MeritSweepCost>,
+    /// The cost of poses; `None` for a lens whose surfaces are decentred, tilted or irregular by design.
+    pub poses: Option<PoseCost>,
 }
 
 /// The cost of the gradient of the as-built merit.
@@ -92,18 +97,19 @@ pub enum ToleranceBenchmarkError {
     Threads(#[from] BenchmarkError),
 }
 
-/// Measures the tolerances of a class on a lens, with this many real lenses. `None` once `stop` is true.
+/// Measures the tolerances of a class on a lens, filled up to this many errors, with this many real lenses. `None`
+/// once `stop` is true.
 ///
 /// # Errors
 /// A lens that has no tolerances.
 pub fn measure_tolerances(
     lens: &Lens,
     grade: ToleranceGrade,
-    samples: usize,
+    (count, samples): (usize, usize),
     stop: &AtomicBool,
 ) -> Result<Option<ToleranceBenchmark>, ToleranceBenchmarkError> {
     let scene = ToleranceScene::new(lens, 0, ACCURACY)?;
-    let sheet = graded_sheet(lens, &scene.lens, grade);
+    let sheet = filled_sheet(graded_sheet(lens, &scene.lens, grade), &scene.lens, count);
     let errors: Vec<Perturbation> = sheet.errors.iter().map(|t| t.error).collect();
     let jets = || sensitivities(&scene.lens, &scene.beam, scene.options, &errors);
     let [one, two] = [1, 2].map(|threads| ThreadPoolBuilder::new().num_threads(threads).build());
@@ -137,6 +143,8 @@ pub fn measure_tolerances(
     if is_stopped() {
         return Ok(None);
     }
+    let is_centred = scene.lens.systems.iter().all(|system| !system.has_poses());
+    let poses = is_centred.then(|| pose_cost(&scene, &one)).transpose()?;
     Ok(Some(ToleranceBenchmark {
         errors: errors.len(),
         rays: scene.beam.rays(),
@@ -150,6 +158,8 @@ pub fn measure_tolerances(
         samples: traced?,
         samples_ms,
         gradients: one.install(|| gradient_costs(lens, &sheet))?,
+        merits: merit_sweep_cost((lens, &scene, ACCURACY), &sheet, &one).ok(),
+        poses,
     }))
 }
 

@@ -103,6 +103,8 @@ pub struct Quantile {
     pub form: f64,
     /// The same corrected by the real lenses, in mm.
     pub corrected: f64,
+    /// The standard error of the latter, in mm.
+    pub error: f64,
 }
 
 /// The share of good lenses.
@@ -347,7 +349,7 @@ fn as_built(
     let spread = mean_with_error(&many)[1];
     let corrected = form_mean_rms + difference[0];
     let columns = [0, 1].map(|i| sorted(pairs.iter().map(|pair| pair[i]).collect()));
-    let at_share = |share: f64| quantile(share, &many, &columns);
+    let at_share = |share: f64| quantile(share, &many, (&columns, &pairs));
     AsBuiltSpot {
         focus,
         nominal_rms: form.as_designed().sqrt(),
@@ -408,12 +410,35 @@ fn sorted(mut values: Vec<f64>) -> Vec<f64> {
     values
 }
 
-/// A quantile of lenses by the form, corrected by the real lenses and the form on the same errors, all
-/// of them sorted.
-fn quantile(share: f64, many: &[f64], [real, same]: &[Vec<f64>; 2]) -> Quantile {
+/// A quantile of lenses by the form, corrected by the real lenses and the form on the same errors; `columns` are
+/// these sorted, `pairs` lens by lens.
+fn quantile(
+    share: f64,
+    many: &[f64],
+    ([real, same], pairs): (&[Vec<f64>; 2], &[[f64; 2]]),
+) -> Quantile {
     let form = at_share(many, share);
     let change = if real.is_empty() { 0.0 } else { at_share(real, share) - at_share(same, share) };
-    Quantile { share, form, corrected: form + change }
+    let error = sampled_error(many, share).hypot(change_error(pairs, same, share));
+    Quantile { share, form, corrected: form + change, error }
+}
+
+/// The standard error of a quantile of a sample: half of the distance between those of the shares that are one
+/// standard error of a share apart from it.
+fn sampled_error(sorted: &[f64], share: f64) -> f64 {
+    let step = (share * (1.0 - share) / sorted.len().max(1) as f64).sqrt();
+    let [low, high] = [share - step, share + step].map(|s| at_share(sorted, s.clamp(0.0, 1.0)));
+    0.5 * (high - low)
+}
+
+/// The standard error of the change of a quantile from the form to real lenses on the same errors: that of the mean
+/// of their differences over the lenses about the quantile, which are twice the smaller share beside it.
+fn change_error(pairs: &[[f64; 2]], same: &[f64], share: f64) -> f64 {
+    let least = share.min(1.0 - share).max(1.0 / same.len().max(1) as f64);
+    let [low, high] = [share - least, share + least].map(|s| at_share(same, s.clamp(0.0, 1.0)));
+    let near = pairs.iter().filter(|[_, form]| (low..=high).contains(form));
+    let differences: Vec<f64> = near.map(|[real, form]| real - form).collect();
+    mean_with_error(&differences)[1]
 }
 
 /// The value that a share of sorted values does not exceed, between two of them linearly.

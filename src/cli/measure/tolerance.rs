@@ -9,12 +9,12 @@ use crate::cli::progress::stop_flag;
 use crate::files;
 use crate::lens::{Lens, ToleranceGrade};
 use crate::measure::{
-    AsBuiltComparison, Machine, MadeDesign, ToleranceBenchmark, ToleranceBenchmarkError,
-    compare_as_built, measure_tolerances,
+    AgreementRow, AsBuiltComparison, Machine, MadeDesign, ReferenceAgreement, ToleranceBenchmark,
+    ToleranceBenchmarkError, ToleranceReference, compare_as_built, measure_tolerances,
 };
 use serde::Serialize;
 use std::fmt::{self, Display};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Exactness and cost of tolerances, and the spread of lenses by a design that is optimized as built
 #[derive(Debug, clap::Args)]
@@ -28,6 +28,10 @@ pub(super) struct MeasureToleranceArgs {
     #[arg(long, value_enum, value_name = "GRADE", default_value_t = ToleranceGrade::Commercial)]
     grade: ToleranceGrade,
 
+    /// The number of errors: those of the class, filled up with different ones of further kinds
+    #[arg(long, default_value_t = 150, value_name = "N")]
+    errors: usize,
+
     /// Lenses with random errors whose rays are traced
     #[arg(long, default_value_t = 500, value_name = "N")]
     samples: usize,
@@ -39,6 +43,10 @@ pub(super) struct MeasureToleranceArgs {
     /// A Python that has Optiland: its tolerancing of the same lens and errors is timed in the same run
     #[arg(long, value_name = "PYTHON")]
     optiland: Option<PathBuf>,
+
+    /// Exact answers of other lenses (.json, as tests/reference/tolerances.json): the agreement with them alone
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["lens", "optiland"])]
+    reference: Option<PathBuf>,
 }
 
 /// The lens without a file: that of costs, and that which is optimized.
@@ -50,10 +58,17 @@ impl MeasureToleranceArgs {
         if self.samples == 0 {
             return Err(CliError::Input("--samples: found 0; expected 1 or more".into()));
         }
+        if self.errors == 0 {
+            return Err(CliError::Input("--errors: found 0; expected 1 or more".into()));
+        }
+        if let Some(path) = &self.reference {
+            return agree_with_reference(path, self.samples, output);
+        }
         let (lens, file) = self.lens()?;
         let fail = |e: ToleranceBenchmarkError| CliError::Failed(format!("{file}: {e}"));
         let stop = stop_flag();
-        let cost = measure_tolerances(&lens, self.grade, self.samples, &stop).map_err(fail)?;
+        let cost = measure_tolerances(&lens, self.grade, (self.errors, self.samples), &stop)
+            .map_err(fail)?;
         let Some(cost) = cost else {
             let text = "stopped before the costs were measured".to_owned();
             return Err(CliError::Failed(text));
@@ -92,6 +107,51 @@ fn bundled(name: &str) -> Result<(Lens, String), CliError> {
     Ok((lens, name.to_owned()))
 }
 
+/// Prints the agreement with the exact answers of a file.
+fn agree_with_reference(path: &Path, samples: usize, output: &Output) -> Result<(), CliError> {
+    let file = path.display().to_string();
+    let wrong = |why: &dyn Display| CliError::Input(format!("{file}: {why}"));
+    let text = std::fs::read_to_string(path).map_err(|why| wrong(&why))?;
+    let reference: ToleranceReference = serde_json::from_str(&text).map_err(|why| wrong(&why))?;
+    let stop = stop_flag();
+    let mut lenses = Vec::new();
+    for lens in &reference.lenses {
+        let found = lens.agreement(samples, &stop);
+        let failed = |why| CliError::Failed(format!("{file}: {}: {why}", lens.id));
+        let stopped = || CliError::Failed("stopped before all answers were compared".to_owned());
+        lenses.push(found.map_err(failed)?.ok_or_else(stopped)?);
+    }
+    let agrees = lenses.iter().flat_map(|lens| &lens.rows).all(AgreementRow::agrees);
+    output.print(&ReferenceReport { machine: Machine::detect(), file, lenses })?;
+    let differ = || CliError::Failed("answers differ by more than their bounds".to_owned());
+    agrees.then_some(()).ok_or_else(differ)
+}
+
+#[derive(Serialize)]
+struct ReferenceReport {
+    machine: Machine,
+    file: String,
+    lenses: Vec<ReferenceAgreement>,
+}
+
+impl Display for ReferenceReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}\n{}\n", self.machine, self.file)?;
+        let head = ["lens", "answers", "number", "largest difference", "bound", ""];
+        let mut table = TextTable::new(&head);
+        for lens in &self.lenses {
+            for row in &lens.rows {
+                let kept = if row.agrees() { "kept" } else { "broken" };
+                let [largest, bound] = [row.largest, row.bound].map(|value| format!("{value:.1e}"));
+                let cells = [row.what.to_owned(), row.answers.to_string(), largest, bound];
+                let cells = std::iter::once(lens.id.clone()).chain(cells);
+                table.row(cells.chain([kept.to_owned()]));
+            }
+        }
+        write!(f, "{table}")
+    }
+}
+
 #[derive(Serialize)]
 struct MeasureToleranceReport {
     machine: Machine,
@@ -120,12 +180,28 @@ impl MeasureToleranceReport {
         let sweep = format!("sensitivities by {errors} errors, {rays} rays, one core");
         row(sweep, ms(5.0), ms(cost.sweep_ms));
         row("the same with second derivatives of rays".into(), String::new(), ms(cost.jets_ms));
+        if let Some(merits) = &cost.merits {
+            row("the same of the wavefront".into(), String::new(), ms(merits.wavefront_ms));
+            let at = ShortNumber(merits.frequency);
+            let contrast = format!("the same of the contrast at {at} cycles/mm");
+            row(contrast, String::new(), ms(merits.contrast_ms));
+        }
         row("yield by the quadratic form, one core".into(), ms(50.0), ms(cost.form_ms));
         row(format!("{samples} real lenses, two cores"), ms(1000.0), ms(cost.samples_ms));
         for gradient in &cost.gradients {
             let what = format!("as-built gradient, {} tolerances", gradient.tolerances);
             let ratio = format!("{:.1} x ({})", gradient.ordinary_gradients, ms(gradient.ms));
             row(what, "8 ordinary ones".into(), ratio);
+        }
+        if let Some(poses) = &cost.poses {
+            let [centred, posed] = [poses.centred_ns, poses.posed_ns].map(ShortNumber);
+            row(
+                "a ray of the centred lens, one core".into(),
+                String::new(),
+                format!("{centred} ns"),
+            );
+            let reached = format!("{posed} ns, {} rays differ", poses.different);
+            row("the same as one with poses".into(), "the same bits".into(), reached);
         }
         table
     }

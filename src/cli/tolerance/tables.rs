@@ -24,7 +24,7 @@ impl ToleranceReport {
         row("Monte Carlo minus quadratic model".into(), &|s| with_error(s.difference));
         for (i, quantile) in self.spots[0].quantiles.iter().enumerate() {
             let name = format!("{:.0} % of the lenses, at most", 100.0 * quantile.share);
-            row(name, &|s| short(s.quantiles[i].corrected));
+            row(name, &|s| with_error([s.quantiles[i].corrected, s.quantiles[i].error]));
         }
         if self.spots[0].good.is_some() {
             row("yield".into(), &|s| s.good.map_or(String::new(), |g| percent(g.corrected)));

@@ -49,7 +49,8 @@ pub(super) fn summary(ui: &mut Ui, made: &AsBuiltLens) {
     ];
     for (i, quantile) in spots[0].quantiles.iter().enumerate() {
         let name = format!("{:.0} % of the lenses, at most", 100.0 * quantile.share);
-        rows.push((name, spots.each_ref().map(|s| um(s.quantiles[i].corrected))));
+        let of = |s: &AsBuiltSpot| with_error([s.quantiles[i].corrected, s.quantiles[i].error]);
+        rows.push((name, spots.each_ref().map(of)));
     }
     if spots.iter().all(|spot| spot.good.is_some()) {
         rows.push(("Good lenses".into(), spots.each_ref().map(good_share)));
