@@ -8,6 +8,11 @@ use crate::lens::{
 use crate::paraxial::{Beam, first_order};
 
 impl Term {
+    /// True for the term of spots, as designed or as built.
+    pub fn is_of_spots(self) -> bool {
+        matches!(self, Self::Spot | Self::AsBuilt { .. })
+    }
+
     /// True if the term depends on the areas of the pupils.
     pub fn concerns_light(self) -> bool {
         matches!(
@@ -164,7 +169,7 @@ impl Goal {
     /// tolerances of the lens, or those of a class.
     #[must_use]
     pub fn as_built(mut self, grade: Option<ToleranceGrade>) -> Self {
-        for weighted in self.terms.iter_mut().filter(|weighted| weighted.term == Term::Spot) {
+        for weighted in self.terms.iter_mut().filter(|weighted| weighted.term.is_of_spots()) {
             weighted.term = Term::AsBuilt { grade };
         }
         self

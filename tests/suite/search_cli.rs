@@ -275,3 +275,24 @@ fn a_search_has_the_merit_function_of_its_file() {
     let said = String::from_utf8(said.stderr).unwrap();
     assert!(said.contains("leaves out what the merit function asks of some surfaces"), "{said}");
 }
+
+/// A search for the spots of lenses that are made: the term stands in the report for the sharp spots, and the
+/// tolerances of a file, which know no other structure, are refused.
+#[test]
+fn a_search_minimizes_the_spots_of_lenses_that_are_made() {
+    const TESSAR: &str = "lenses/tessar_50_f28.json";
+    let mut lens = files::open(TESSAR).unwrap().lens;
+    lens.merit = Some(Goal::default_for(&lens).unwrap().as_built(None));
+    let file = Scratch::new("as-built-merit.json");
+    files::save(&lens, &file.0).unwrap();
+    let few = ["search", file.path(), "--iterations", "10", "--elements", "3..5"];
+    let words = ["as_built", "those of a class (--as-built commercial)"];
+    refused(2, &few, "", &words);
+    for lens in [TESSAR, file.path()] {
+        let asked = [&["search", lens], &few[2..], &["--as-built", "commercial"]].concat();
+        let report = done_json(&asked, "");
+        let terms = report["terms"].as_array().unwrap();
+        let of = |name: &str| terms.iter().filter(|term| term["term"] == name).count();
+        assert_eq!((of("as_built"), of("spot")), (1, 0), "{report}");
+    }
+}

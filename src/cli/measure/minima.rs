@@ -4,7 +4,7 @@ use crate::cli::error::CliError;
 use crate::cli::input::LensFile;
 use crate::cli::output::{Output, ShortNumber};
 use crate::cli::progress::{note_if_stopped, stop_flag};
-use crate::cli::search::{SearchPlanArgs, give_goal};
+use crate::cli::search::SearchPlanArgs;
 use crate::measure::{Machine, MinimaCount, count_minima};
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -38,7 +38,7 @@ impl MeasureMinimaArgs {
         let mut plan = self.plan_args.plan(&opened.lens)?;
         plan.settings.seed = self.seed;
         let lens = self.plan_args.start_lens(&opened.lens)?;
-        give_goal(&mut plan, &lens).map_err(|cause| refuse(&cause))?;
+        self.plan_args.give_goal(&mut plan, &lens).map_err(|cause| refuse(&cause))?;
         let stop = stop_flag();
         let found =
             count_minima(&lens, &plan, self.starts, &stop).map_err(|cause| refuse(&cause))?;

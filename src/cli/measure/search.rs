@@ -4,7 +4,7 @@ use crate::cli::error::CliError;
 use crate::cli::input::LensFile;
 use crate::cli::output::{Output, ShortNumber, TextTable};
 use crate::cli::progress::{note_if_stopped, stop_flag};
-use crate::cli::search::{SearchPlanArgs, give_goal};
+use crate::cli::search::SearchPlanArgs;
 use crate::measure::{
     Machine, SearchBenchmark, SearchBudget, SearchContender, SearchLength, SearchRow, SignTest,
     compare_searches,
@@ -63,7 +63,8 @@ impl MeasureSearchArgs {
         let opened = self.lens.open()?;
         let mut plan = self.plan_args.plan(&opened.lens)?;
         let lens = self.plan_args.start_lens(&opened.lens)?;
-        give_goal(&mut plan, &lens)
+        self.plan_args
+            .give_goal(&mut plan, &lens)
             .map_err(|cause| CliError::Input(format!("{}: {cause}", opened.file)))?;
         let stop = stop_flag();
         let budget = SearchBudget { length, seeds, first_seed };

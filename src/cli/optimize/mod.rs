@@ -15,7 +15,7 @@ use super::progress::{progress_bar, stop_flag};
 use crate::files::{self, FileError, json};
 use crate::lens::{Lens, ParameterKind, ToleranceGrade, add_variables};
 use crate::measure::time_ms;
-use crate::merit::{Goal, Merit, MeritError, Term};
+use crate::merit::{Goal, Merit, MeritError};
 use crate::optimize::{DescentMethod, OptimizationProgress, Optimizer, start};
 use best_so_far::BestSoFar;
 use report::{OptimizeEnd, OptimizeOutcome, OptimizeReport, OptimizeRun, SavedParts};
@@ -140,7 +140,7 @@ impl OptimizeArgs {
             Some(path) => input::read_json(path).map_err(GoalError::Failure)?,
             None => Goal::of_lens(lens).map_err(GoalError::Merit)?,
         };
-        if self.as_built.is_some() && !goal.terms.iter().any(|w| w.term == Term::Spot) {
+        if self.as_built.is_some() && !goal.terms.iter().any(|w| w.term.is_of_spots()) {
             let text = "--as-built: found a merit function without a term `spot`; expected one";
             return Err(GoalError::Failure(CliError::Input(text.to_owned())));
         }

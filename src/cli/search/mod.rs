@@ -21,7 +21,7 @@ use crate::lens::Lens;
 use crate::measure::Stopwatch;
 use crate::merit::MeritError;
 use crate::search::lens_landscape::{
-    FinalizedLens, LandscapeError, LensLandscape, SearchPlan, describe_left_out, finalize,
+    FinalizedLens, LandscapeError, LensLandscape, SearchPlan, finalize,
 };
 use crate::search::{FoundPoint, RunEnd, SearchError, SearchMethod, SearchRun, SearchRunOn};
 use best_so_far::BestSoFar;
@@ -123,18 +123,6 @@ impl WatchedRun<'_> {
     }
 }
 
-/// Gives a search without a merit function that of the lens, if there is one, and says which terms a
-/// search cannot have.
-pub(super) fn give_goal(plan: &mut SearchPlan, lens: &Lens) -> Result<(), LandscapeError> {
-    let Some(own) = lens.merit.as_ref().filter(|_| plan.goal.is_none()) else { return Ok(()) };
-    let (goal, left_out) = plan.goal_of_design(lens, own)?;
-    plan.goal = Some(goal);
-    if let Some(text) = describe_left_out(&left_out) {
-        print_note(format!("note: {text}"));
-    }
-    Ok(())
-}
-
 impl SearchArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         self.check()?;
@@ -150,7 +138,7 @@ impl SearchArgs {
         let effects = design.report(&start, &opened.file)?;
         let original = Lens { wavelengths: start.wavelengths, ..opened.lens.clone() };
         let refused = |cause: LandscapeError| self.landscape_error(&opened.file, cause);
-        give_goal(&mut plan, &lens).map_err(refused)?;
+        self.plan_args.give_goal(&mut plan, &lens).map_err(refused)?;
         let landscape = plan.landscape(&lens).map_err(refused)?;
         let start_breaks = landscape.violations(landscape.start()).map_err(refused)?;
         let (mut run, resumed) = self.start_or_resume(&landscape, &plan, &opened.file)?;

@@ -2,10 +2,13 @@
 
 use crate::cli::error::CliError;
 use crate::cli::input::{self, Tolerance};
-use crate::cli::output::ShortNumber;
-use crate::lens::{FieldKind, FieldPoint, Fields, Lens, Object, Wavelength};
+use crate::cli::output::{ShortNumber, print_note};
+use crate::lens::{FieldKind, FieldPoint, Fields, Lens, Object, ToleranceGrade, Wavelength};
+use crate::merit::Goal;
 use crate::optimize::DescentMethod;
-use crate::search::lens_landscape::{DescentSettings, SearchPlan, with_open_apertures};
+use crate::search::lens_landscape::{
+    DescentSettings, LandscapeError, SearchPlan, describe_left_out, with_open_apertures,
+};
 use crate::search::{MutationKind, SearchRules, Temperature, element};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -17,6 +20,11 @@ pub(in crate::cli) struct SearchPlanArgs {
     /// and focal length
     #[arg(long, value_name = "FILE")]
     goal: Option<PathBuf>,
+
+    /// Minimizes the spots of lenses that are made with the tolerances of this class, in place of the
+    /// spots as designed
+    #[arg(long, value_enum, value_name = "GRADE")]
+    as_built: Option<ToleranceGrade>,
 
     /// The target focal length in mm; absent: the present one
     #[arg(long, value_name = "MM", conflicts_with = "goal", allow_negative_numbers = true)]
@@ -183,6 +191,38 @@ impl SearchPlanArgs {
     pub(in crate::cli) fn files(&self) -> impl Iterator<Item = (&'static str, &Path)> {
         let goal = self.goal.as_deref().map(|path| ("--goal", path));
         goal.into_iter().chain(self.rules.as_deref().map(|path| ("--rules", path)))
+    }
+
+    /// The merit function of a plan without one: that of the lens, if there is one, for lenses that are made if
+    /// that was asked for; and the names of its terms that a search cannot have.
+    ///
+    /// # Errors
+    /// A lens without first-order data; a merit function without the spots that are asked for as built.
+    pub(in crate::cli) fn give_goal(
+        &self,
+        plan: &mut SearchPlan,
+        lens: &Lens,
+    ) -> Result<(), LandscapeError> {
+        let own = lens.merit.clone().filter(|_| plan.goal.is_none());
+        let usual = (plan.goal.is_none() && self.as_built.is_some()).then(|| Goal::of_lens(lens));
+        if let Some(own) = own.map_or(usual.transpose()?, Some) {
+            let (goal, left_out) = plan.goal_of_design(lens, &own)?;
+            plan.goal = Some(goal);
+            if let Some(text) = describe_left_out(&left_out) {
+                print_note(format!("note: {text}"));
+            }
+        }
+        if let Some(goal) = plan.goal.as_mut().filter(|_| self.as_built.is_some()) {
+            if !goal.terms.iter().any(|weighted| weighted.term.is_of_spots()) {
+                return Err(LandscapeError::Setting {
+                    what: "--as-built",
+                    found: "a merit function without a term `spot`".to_owned(),
+                    expected: "one",
+                });
+            }
+            *goal = goal.clone().as_built(self.as_built);
+        }
+        Ok(())
     }
 
     /// True if one wavelength replaces those of the lens.

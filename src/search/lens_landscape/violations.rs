@@ -122,6 +122,15 @@ pub(super) fn is_of_whole_lens(weighted: &WeightedTerm) -> bool {
 /// Refuses terms about some surfaces, whose numbers change with the structure, and terms about the
 /// light of a part of the fields, which a finished lens is not tested for.
 pub(super) fn check_scopes(goal: &Goal) -> Result<(), LandscapeError> {
+    let is_of_file = |weighted: &&WeightedTerm| weighted.term == Term::AsBuilt { grade: None };
+    if goal.terms.iter().any(|weighted| is_of_file(&weighted)) {
+        return Err(LandscapeError::Setting {
+            what: "the term `as_built` of the merit function",
+            found: "the tolerances of the lens file".to_owned(),
+            expected: "those of a class (--as-built commercial) in a search over structures, whose \
+                       surfaces have no fixed numbers",
+        });
+    }
     let refused = goal.terms.iter().find(|weighted| !is_of_whole_lens(weighted));
     refused.map_or(Ok(()), |weighted| {
         Err(LandscapeError::Setting {

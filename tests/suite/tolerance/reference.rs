@@ -1,7 +1,7 @@
 //! The lenses, rays and perturbations of `tolerances.json`.
 
 use crate::cli::{Scratch, aplanat, done_json};
-use crate::reference::{count, number, numbers, read};
+use crate::reference::{count, number, read};
 use aplanat::lens::{ErrorDistribution, Perturbation, PerturbationKind, Tolerance};
 use aplanat::measure::ReferenceLens;
 use aplanat::tolerance::{Beam, MeritOptions, NominalLens};
