@@ -74,6 +74,8 @@ struct FieldEffects {
     displacement: DMatrix<f64>,
     /// The change of their slopes.
     bend: DMatrix<f64>,
+    /// The mean effects of numbers, where they come from a sweep back.
+    means: NumberMeans,
     /// The edge of the pupils; `None` where these are held.
     edge: Option<FieldEdge>,
 }
@@ -147,13 +149,12 @@ impl RayEffects {
         }
         let planes = TwoPlanes::new(scene, self.focus)?;
         let mut edges = Vec::with_capacity(folded.len());
-        for ((own, pupils), field) in folded.iter().zip(&pupils.fields).zip(&self.fields) {
-            let (_, means) = planes.columns(scene, own, (numbers, &self.parities))?;
+        for (pupils, field) in pupils.fields.iter().zip(&self.fields) {
             let reference = EdgeReference {
                 numbers,
                 planes: [&planes.near, &planes.far],
                 distance: planes.distance,
-                means: &means,
+                means: &field.means,
                 center: field.center,
             };
             let Some(edge) = FieldEdge::at_rest(scene, pupils, &reference) else {
@@ -222,8 +223,9 @@ impl RayEffects {
         let field = |folded: &FoldedField<'_>| {
             refuse_if_stopped(stop)?;
             let mut field = FieldEffects::without_errors(scene, folded, rays);
-            let (columns, _) = planes.columns(scene, folded, (&numbers, &parities))?;
+            let (columns, means) = planes.columns(scene, folded, (&numbers, &parities))?;
             (field.displacement, field.bend) = columns;
+            field.means = means;
             Ok(field)
         };
         let fields = folded.par_iter().map(field).collect::<Result<_, ToleranceError>>()?;
@@ -439,6 +441,7 @@ impl FieldEffects {
             slopes,
             displacement: none.clone(),
             bend: none,
+            means: Vec::new(),
             edge: None,
         }
     }

@@ -7,9 +7,8 @@
 //! direction `k`, adds `k` times that (Hopkins and Tiziani, *British Journal of Applied Physics* 17,
 //! 1966). No derivative of a ray is needed.
 
-use super::errors::{
-    AdjointColumns, ErrorColumns, ErrorNumber, ErrorRows, HitColumns, Lane, TracedLanes, add_lanes,
-};
+use super::error_lanes::{ErrorColumns, HitColumns, Lane, TracedLanes};
+use super::errors::{AdjointColumns, ErrorNumber, ErrorRows, add_lanes};
 use crate::trace::Tracer;
 use crate::trace::batch::Rays;
 

@@ -16,6 +16,7 @@
 //! [`super::interface`]; the cost does not depend on the number of parameters.
 
 mod block;
+mod error_lanes;
 mod error_paths;
 mod errors;
 mod grin;
