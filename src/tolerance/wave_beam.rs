@@ -80,6 +80,11 @@ impl WaveField {
         (total > 0.0).then_some(Self { weight: field.weight, rays, weights, pupil, tilts })
     }
 
+    /// The number of a ray in messages: the chief ray is the first one of a field.
+    fn number_of(&self, place: usize) -> usize {
+        if place + 1 == self.rays.len() { 0 } else { place }
+    }
+
     /// Takes piston and tilt across the pupil from values of all rays.
     pub(super) fn remove_tilt(&self, values: &mut [f64]) {
         for tilt in &self.tilts {
@@ -166,8 +171,7 @@ impl WaveBeam {
             for (place, (ray, start)) in field.rays.iter().enumerate() {
                 let traced = tracer.trace(ray.cast());
                 if !traced.fate.is_imaged() {
-                    // The chief ray is the first one of a field for a reader.
-                    let ray = if place + 1 == field.rays.len() { 0 } else { place };
+                    let ray = field.number_of(place);
                     return Err(ToleranceError::RayLost { field: number, ray, fate: traced.fate });
                 }
                 let (point, to) = (traced.ray.point, traced.ray.direction);
