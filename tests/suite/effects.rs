@@ -9,6 +9,7 @@ use aplanat::files;
 use aplanat::lens::{FieldKind, FieldPoint, Lens, Object, Row, Shape};
 use aplanat::pupil::{Accuracy, Aiming, RayModel};
 use aplanat::trace::TraceSink as _;
+use std::collections::BTreeSet;
 
 const TASK: TracePurpose = TracePurpose::Spot(1e-3);
 
@@ -116,7 +117,8 @@ fn check(by_plan: &PlannedLens<'_>, decision: &EffectDecision) {
 #[test]
 fn forcing_an_effect_on_changes_no_more_than_the_plan_said() {
     for (name, lens) in library() {
-        for zoom in 0..lens.zoom_positions() {
+        let last = lens.zoom_positions() - 1;
+        for zoom in BTreeSet::from([0, last]) {
             let auto = planned(&lens, zoom, TASK, &EffectOverrides::default());
             let by_plan = PlannedLens::new(name, zoom, &lens, &auto);
             println!("{name} zoom {zoom}");
@@ -388,7 +390,7 @@ fn rays_let_through(lens: &Lens, plans: &[EffectPlan; 2]) -> (usize, usize) {
                     model.launch(*field, wavelength).ok()?.trace_points(&points);
                 let imaged = |i: &usize| landed.fate(*i).is_imaged();
                 let arrived = (0..indices.len()).filter(imaged).map(|i| indices[i]);
-                Some(arrived.collect::<std::collections::BTreeSet<_>>())
+                Some(arrived.collect::<BTreeSet<_>>())
             };
             let (Some(open), Some(closed)) = (landed(&open), landed(&closed)) else { continue };
             different += open.symmetric_difference(&closed).count();

@@ -140,7 +140,9 @@ fn every_term_has_the_derivative_of_its_value() {
 
 #[test]
 fn every_term_includes_the_motion_of_the_pupil() {
-    for name in ["double_gauss_rudolph_50", "double_gauss_nikkor_s_50"] {
+    for (first, name) in ["double_gauss_rudolph_50", "double_gauss_nikkor_s_50"].iter().enumerate()
+    {
+        let name = *name;
         let mut lens = bundled(name);
         lens.variables.clear();
         if name == "double_gauss_nikkor_s_50" {
@@ -154,6 +156,9 @@ fn every_term_includes_the_motion_of_the_pupil() {
             let rim = Parameter::new(surface, Quantity::SemiDiameter);
             let size = lens.get(rim).unwrap();
             lens.set(rim, size * (1.0 + 1e-3 * surface as f64));
+        }
+        // Every other surface, in front of the stop and behind it.
+        for surface in (first..lens.surfaces.len()).step_by(2) {
             for quantity in [Quantity::Curvature, Quantity::Thickness, Quantity::SemiDiameter] {
                 vary(&mut lens, surface, quantity);
             }

@@ -288,11 +288,12 @@ fn a_search_from_a_lens_with_gradients_finds_a_better_one() {
     // One field of the rod, which costs most, is enough.
     let mut rod = bundled("grin_rod_melles_griot");
     rod.fields.values.truncate(1);
-    for (lens, rules) in [
+    for (mut lens, rules) in [
         (rod, SearchRules { elements: [1, 4], ..small() }),
         (bundled("wood_lens_60"), SearchRules { elements: [1, 4], ..SearchRules::default() }),
         (busy(), SearchRules::default()),
     ] {
+        lens.wavelengths = vec![lens.wavelengths[lens.primary()]];
         let run = whole(&lens, rules);
         let (start, best) = (run.start().loss, run.best().loss);
         println!("{}: {start:.3e} to {best:.3e}, {} born", lens.name, run.lineage().total());
@@ -312,7 +313,8 @@ fn a_search_from_a_lens_with_gradients_finds_a_better_one() {
 
 #[test]
 fn a_finalized_lens_keeps_its_gradient_indices() {
-    let (lens, row) = triplet(&[-2e-4], &[-0.004]);
+    let (mut lens, row) = triplet(&[-2e-4], &[-0.004]);
+    lens.wavelengths = vec![lens.wavelengths[lens.primary()]];
     let landscape = SearchPlan::default().landscape(&lens).unwrap();
     let done = finalize(&landscape, landscape.start()).unwrap();
     assert_eq!(done.gradients, [row]);
