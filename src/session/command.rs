@@ -223,6 +223,9 @@ pub enum PanelSetting {
     PointImages(bool),
     /// True to compute the images of a point by rays.
     RayImages(bool),
+    /// The index of the wavelength of wavefronts and images of a point; `None` for the primary one of wavefronts and
+    /// all light of images.
+    WavefrontWavelength(Option<usize>),
     /// True to compute the footprints of the fields.
     Footprints(bool),
     /// True to compute the spot over the whole field.

@@ -32,7 +32,7 @@ pub use ray_images::{FieldRayImage, RayImages};
 pub use scene::{PictureScene, SceneFile};
 use scene_picture::PictureExtras;
 pub use scene_picture::ScenePicture;
-pub use wavefronts::{FieldWavefront, FieldWavefronts, PointImage, PointImages};
+pub use wavefronts::{ENERGY_SHARES, FieldWavefront, FieldWavefronts, PointImage, PointImages};
 
 use super::clock::{Timed, now, time};
 use super::run::{LatestRequestWorker, WorkerOutput, catch_panic};
@@ -536,6 +536,10 @@ pub struct AnalysisSettings {
     /// True if the images of a point by rays are computed, because the panel shows them.
     #[serde(default)]
     pub ray_images: bool,
+    /// The index of the wavelength of the wavefronts and of the images of a point; `None` for the primary one of
+    /// wavefronts and for all light of images.
+    #[serde(default)]
+    pub wavefront_wavelength: Option<usize>,
     /// True if the ray fans are computed, because a panel shows them.
     #[serde(default)]
     pub fans: bool,
@@ -634,6 +638,7 @@ impl Default for AnalysisSettings {
             wavefronts: false,
             point_images: false,
             ray_images: false,
+            wavefront_wavelength: None,
             fans: false,
             path_fans: false,
             field_curves: false,

@@ -316,6 +316,9 @@ impl Session {
             PanelSetting::ToleranceFrequency(nu) => settings.tolerance_frequency = nu,
             PanelSetting::Loosest(goal) => settings.loosest = goal,
             PanelSetting::PupilWavelength(wavelength) => settings.pupil_wavelength = wavelength,
+            PanelSetting::WavefrontWavelength(wavelength) => {
+                settings.wavefront_wavelength = wavelength;
+            }
         });
         self.message_is_recent = is_recent;
     }

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use egui::{
-    Align, Button, Color32, ColorImage, Grid, Image, Layout, RichText, ScrollArea, TextureHandle,
-    TextureOptions, Ui, vec2,
+    Align, Button, Color32, ColorImage, ComboBox, Grid, Image, Layout, RichText, ScrollArea,
+    TextureHandle, TextureOptions, Ui, vec2,
 };
 
 use super::figure_view::{ChartForm, accuracy_section, bare_chart, export_menu};
@@ -14,14 +14,17 @@ use super::{
 };
 use crate::analysis::{Estimate, SquareGrid, ZernikeOrder, ZernikeSum, aberration_name};
 use crate::lens::Fields;
+use crate::pupil::RayModel;
 use crate::report::FigureKind;
 use crate::session::{
-    Analyses, AnalysisResults, Command, FieldRayImage, FieldWavefront, FieldWavefronts,
-    PanelSetting, PointImage, PointImages, RayImages, SessionView, Timed, analysis_figure,
+    Analyses, AnalysisResults, Command, ENERGY_SHARES, FieldRayImage, FieldWavefront,
+    FieldWavefronts, PanelSetting, PointImage, PointImages, RayImages, SessionView, Timed,
+    analysis_figure,
 };
 use crate::studio::actions::Actions;
 use crate::studio::cached::{ByAddress, Cached};
 use crate::studio::colormap;
+use crate::studio::form::named_list;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 
@@ -125,7 +128,11 @@ impl Panel for WavefrontPanel {
         let Some((results, numbers)) = displayed_results(view) else {
             return show_missing_results(ui, view);
         };
-        self.pages(ui, actions);
+        ui.horizontal_wrapped(|ui| {
+            self.pages(ui);
+            self.light(ui, view, numbers, actions);
+            export_menu(ui, self.page.figure(self.by_rays), actions);
+        });
         self.ask(view, actions);
         let kind = self.kind();
         if self.page == WavefrontPage::Image && !self.by_rays {
@@ -193,7 +200,9 @@ impl<'a> PageNumbers<'a> {
         let at = |um: f64| format!("at {:.0} nm", 1e3 * um);
         let (light, ms) = match self {
             Self::Waves(waves) => (at(waves.value.um), waves.ms),
-            Self::Images(images) => (at(images.value.um), images.ms),
+            Self::Images(images) => {
+                (images.value.um.map_or_else(|| "all wavelengths".to_owned(), at), images.ms)
+            }
             Self::Rays(images) => ("all wavelengths".to_owned(), images.ms),
         };
         let rays: usize = (0..self.count()).filter_map(|i| self.rays(i)).sum();
@@ -276,35 +285,63 @@ impl WavefrontPanel {
         }
     }
 
-    fn pages(&mut self, ui: &mut Ui, actions: &mut Actions) {
-        ui.horizontal_wrapped(|ui| {
-            ui.spacing_mut().item_spacing.x = 2.0;
-            for (page, name, hint) in PAGES {
-                let button = Button::selectable(self.page == page, name);
-                if ui.add(button).on_hover_text(hint).clicked() {
-                    self.page = page;
-                }
+    fn pages(&mut self, ui: &mut Ui) {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        for (page, name, hint) in PAGES {
+            let button = Button::selectable(self.page == page, name);
+            if ui.add(button).on_hover_text(hint).clicked() {
+                self.page = page;
             }
-            if self.page.shows_images() {
-                let diffraction = "By diffraction at the primary wavelength";
-                ui.selectable_value(&mut self.by_rays, false, "Diffraction")
-                    .on_hover_text(diffraction);
-                let rays = "By rays alone, over all wavelengths";
-                ui.selectable_value(&mut self.by_rays, true, "Rays").on_hover_text(rays);
+        }
+        if self.page.shows_images() {
+            let diffraction = "By diffraction at one wavelength or at all of them";
+            ui.selectable_value(&mut self.by_rays, false, "Diffraction").on_hover_text(diffraction);
+            let rays = "By rays alone, over all wavelengths";
+            ui.selectable_value(&mut self.by_rays, true, "Rays").on_hover_text(rays);
+        }
+        if self.page == WavefrontPage::Zernike {
+            let noll = "Noll's order, whose terms have an RMS of 1";
+            ui.selectable_value(&mut self.is_fringe, false, "Noll").on_hover_text(noll);
+            let fringe = "The fringe order, whose terms are 1 at the rim";
+            ui.selectable_value(&mut self.is_fringe, true, "Fringe").on_hover_text(fringe);
+        }
+        if self.page == WavefrontPage::Image {
+            let hint = format!("Intensities down to {:.0e} of the largest", 10f64.powf(-DECADES));
+            ui.checkbox(&mut self.is_logarithmic, "Logarithmic").on_hover_text(hint);
+        }
+    }
+
+    /// The choice of the wavelength of what is shown, if there are several: of images all of them too. Images by
+    /// rays are always those of all.
+    fn light(&self, ui: &mut Ui, view: &SessionView, numbers: &Analyses, actions: &mut Actions) {
+        let model = &numbers.ray_model.value;
+        if model.channels.len() < 2 || self.kind() == NumberKind::RayImages {
+            return;
+        }
+        let shown = view.settings.wavefront_wavelength;
+        let shown = shown.filter(|index| *index < model.channels.len());
+        let can_be_all = self.page.shows_images();
+        let shown = if can_be_all { shown } else { Some(shown.unwrap_or(model.primary)) };
+        let name = |index: Option<usize>| {
+            index
+                .map_or_else(|| "All wavelengths".to_owned(), |index| wavelength_name(model, index))
+        };
+        let mut chosen = shown;
+        let combo = ComboBox::from_id_salt("wavefront wavelength").width(96.0);
+        let combo = combo.selected_text(name(shown)).show_ui(ui, |ui| {
+            if can_be_all {
+                ui.selectable_value(&mut chosen, None, name(None));
             }
-            if self.page == WavefrontPage::Zernike {
-                let noll = "Noll's order, whose terms have an RMS of 1";
-                ui.selectable_value(&mut self.is_fringe, false, "Noll").on_hover_text(noll);
-                let fringe = "The fringe order, whose terms are 1 at the rim";
-                ui.selectable_value(&mut self.is_fringe, true, "Fringe").on_hover_text(fringe);
+            for index in 0..model.channels.len() {
+                let primary = if index == model.primary { ", primary" } else { "" };
+                let text = format!("{}{primary}", name(Some(index)));
+                ui.selectable_value(&mut chosen, Some(index), text);
             }
-            if self.page == WavefrontPage::Image {
-                let hint =
-                    format!("Intensities down to {:.0e} of the largest", 10f64.powf(-DECADES));
-                ui.checkbox(&mut self.is_logarithmic, "Logarithmic").on_hover_text(hint);
-            }
-            export_menu(ui, self.page.figure(self.by_rays), actions);
         });
+        named_list(ui, combo, "Wavelength of the wavefront");
+        if chosen != shown {
+            actions.push(Command::Show(PanelSetting::WavefrontWavelength(chosen)));
+        }
     }
 
     /// A picture of each field, as many beside each other as there is room for.
@@ -338,6 +375,11 @@ impl WavefrontPanel {
             });
         });
     }
+}
+
+/// The name of a wavelength of a model.
+fn wavelength_name(model: &RayModel, index: usize) -> String {
+    model.channels.get(index).map_or_else(String::new, |wave| format!("{:.1} nm", 1e3 * wave.um))
 }
 
 /// The path differences of a field as a picture.
@@ -457,27 +499,36 @@ fn image_lines(image: &PointImage) -> Vec<String> {
 
 fn ray_lines(found: &FieldRayImage) -> Vec<String> {
     let width = number::format_digits(2e3 * found.image.density.half_width, 3);
-    let half = half_energy(found);
+    let shares = found.image.share_radii.iter().copied().map(Some).collect::<Vec<_>>();
     vec![
-        half.map_or("half the light: beyond the image".to_owned(), |radius| {
-            format!("half the light within {} µm", number::format_digits(1e3 * radius, 3))
-        }),
+        share_text(&shares),
         format!("{width} µm wide, {} of the peak", plain_error(100.0 * found.image.error, " %")),
     ]
 }
 
-/// The radius of the circle with half of the light, between the circles that are known, in mm.
-fn half_energy(found: &FieldRayImage) -> Option<f64> {
-    let circles = found.radii.iter().zip(&found.image.energy);
-    let mut before = (0.0, 0.0);
-    for (radius, share) in circles {
-        if share.value >= 0.5 {
-            let part = (0.5 - before.1) / (share.value - before.1);
-            return Some(before.0 + part * (radius - before.0));
-        }
-        before = (*radius, share.value);
+/// The radii of the circles that hold shares of the light.
+fn share_text(radii: &[Option<Estimate>]) -> String {
+    let text = |(share, radius): (&f64, &Option<Estimate>)| {
+        let within = radius.map_or_else(
+            || "beyond the image".to_owned(),
+            |radius| format!("within {} µm", number::format_digits(1e3 * radius.value, 3)),
+        );
+        format!("{:.0} % {within}", 100.0 * share)
+    };
+    let list: Vec<String> = ENERGY_SHARES.iter().zip(radii).map(text).collect();
+    list.join(", ")
+}
+
+/// The radii of shares of a field; `None` without light.
+fn field_shares(results: &AnalysisResults, kind: FigureKind, field: usize) -> Option<String> {
+    let numbers = results.analyses.as_ref().ok()?;
+    if kind == FigureKind::RayEnergy {
+        let found = numbers.ray_images.as_ref()?.value.fields.get(field)?.value.as_ref().ok()?;
+        let radii = found.image.share_radii.iter().copied().map(Some).collect::<Vec<_>>();
+        return Some(share_text(&radii));
     }
-    None
+    let found = numbers.point_images.as_ref()?.value.fields.get(field)?.value.as_ref().ok()?;
+    Some(share_text(&found.share_radii))
 }
 
 /// The share of the light within circles, a curve for each field.
@@ -491,8 +542,14 @@ fn energies(ui: &mut Ui, results: &AnalysisResults, kind: FigureKind) {
         ui.label(RichText::new("share of the light").small());
         for i in 0..fields.values.len() {
             heading(ui, fields, i);
+            if let Some(shares) = field_shares(results, kind, i) {
+                ui.label(RichText::new(shares).small());
+            }
         }
     });
+    if kind == FigureKind::Energy {
+        ui.label(RichText::new("dashed: without aberrations").small().weak());
+    }
     let height = (ui.available_height() - 24.0).max(SIDE[0]);
     for chart in figure.rows.iter().flatten() {
         if chart.curves.is_empty() {
