@@ -14,10 +14,12 @@ use crate::math::Vec3;
 use crate::pupil::{Accuracy, ConvergedList, RayModel};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::cell::Cell;
 
 /// The light that makes an image of a point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ImageLight {
     /// The wavelength of this index in the ray model alone.
     Wavelength(usize),

@@ -108,7 +108,7 @@ mod tests {
         assert_eq!(csv(&report), expected);
     }
 
-    /// What symmetry makes 0 but for rounding is 0, beside the other coordinate or its own error; small numbers that
+    /// A coordinate that symmetry makes 0 but for rounding is 0, beside the other coordinate or its own error; small numbers that
     /// mean something stay.
     #[test]
     fn rounding_is_written_as_zero() {

@@ -352,17 +352,11 @@ impl AnalyzeArgs {
             AnalysisKind::LateralColor => self.finish(&run, color::lateral_colors(&run), output),
             AnalysisKind::Longitudinal => self.finish(&run, color::longitudinal(&run), output),
             AnalysisKind::Footprint => {
-                self.finish(&run, color::footprints(&run, self.surface.unwrap_or(SURFACE))?, output)
+                let surface = self.surface.unwrap_or(SURFACE);
+                self.finish(&run, color::footprints(&run, surface)?, output)
             }
             AnalysisKind::FieldCurvature => self.finish(&run, chief::curvatures(&run), output),
-            AnalysisKind::Illumination => {
-                let wave = self.wave.map(|wave| illumination::wave_scene(wave, self.distance));
-                let is_far = self.distance.is_none_or(|distance| distance > 0.0);
-                let option = if is_far { "--wave" } else { "--distance" };
-                let scene =
-                    wave.transpose().map_err(|why| CliError::Input(format!("{option}: {why}")))?;
-                self.finish(&run, illumination::illuminations(&run, scene.as_ref()), output)
-            }
+            AnalysisKind::Illumination => self.finish(&run, self.illuminations(&run)?, output),
             AnalysisKind::ThroughFocus => self.finish(&run, focus::through_focus(&run)?, output),
             AnalysisKind::Wavefront => {
                 self.finish(&run, wavefront::wavefronts(&run, &self.pupil_points), output)
@@ -397,6 +391,18 @@ impl AnalyzeArgs {
                 self.finish(&run, found, output)
             }
         }
+    }
+
+    /// The light at all fields, of the scene that is asked for.
+    fn illuminations(
+        &self,
+        run: &AnalysisRun,
+    ) -> Result<Vec<AtField<illumination::IlluminationJson>>, CliError> {
+        let wave = self.wave.map(|wave| illumination::wave_scene(wave, self.distance));
+        let is_far = self.distance.is_none_or(|distance| distance > 0.0);
+        let option = if is_far { "--wave" } else { "--distance" };
+        let scene = wave.transpose().map_err(|why| CliError::Input(format!("{option}: {why}")))?;
+        Ok(illumination::illuminations(run, scene.as_ref()))
     }
 
     /// Prints the report of all fields, and writes it as CSV if that is asked for; it is printed too

@@ -37,7 +37,7 @@ pub use wavefronts::{ENERGY_SHARES, FieldWavefront, FieldWavefronts, PointImage,
 use super::clock::{Timed, now, time};
 use super::run::{LatestRequestWorker, WorkerOutput, catch_panic};
 use crate::analysis::{
-    self, AnalysisError, Coating, Fan, FieldCurves, Footprint, GhostError, GridPoint,
+    self, AnalysisError, Coating, Fan, FieldCurves, Footprint, GhostError, GridPoint, ImageLight,
     LongitudinalAberration, PathFan, RayLayout, Spot, SpotMap, SpotPoints,
 };
 use crate::effects::{self, Effect, EffectOverride, EffectOverrides, EffectPlan, TracePurpose};
@@ -536,10 +536,10 @@ pub struct AnalysisSettings {
     /// True if the images of a point by rays are computed, because the panel shows them.
     #[serde(default)]
     pub ray_images: bool,
-    /// The index of the wavelength of the wavefronts and of the images of a point; `None` for the primary one of
-    /// wavefronts and for all light of images.
+    /// The light of the images of a point, and of the wavefronts where it is of one wavelength; `None` for the
+    /// primary one, in which wavefronts are computed too where images are in all light.
     #[serde(default)]
-    pub wavefront_wavelength: Option<usize>,
+    pub wavefront_light: Option<ImageLight>,
     /// True if the ray fans are computed, because a panel shows them.
     #[serde(default)]
     pub fans: bool,
@@ -638,7 +638,7 @@ impl Default for AnalysisSettings {
             wavefronts: false,
             point_images: false,
             ray_images: false,
-            wavefront_wavelength: None,
+            wavefront_light: None,
             fans: false,
             path_fans: false,
             field_curves: false,

@@ -161,8 +161,8 @@ fn wavefronts() -> SlowAnalysis<FieldWavefronts> {
         is_asked: |settings| settings.wavefronts,
         compute: |results, analyses, interrupted| {
             let (model, settings) = (&analyses.ray_model.value, &results.settings);
-            let wavelength = settings.wavefront_wavelength;
-            waves::field_wavefronts(model, wavelength, settings.tolerance, interrupted)
+            let light = settings.wavefront_light;
+            waves::field_wavefronts(model, light, settings.tolerance, interrupted)
         },
         slot: |analyses| &mut analyses.wavefronts,
         known: None,
@@ -174,8 +174,8 @@ fn point_images() -> SlowAnalysis<PointImages> {
         is_asked: |settings| settings.wavefronts && settings.point_images,
         compute: |results, analyses, interrupted| {
             let (model, spots) = (&analyses.ray_model.value, &analyses.spots.value);
-            let wavelength = results.settings.wavefront_wavelength;
-            waves::point_images(model, wavelength, spots, interrupted)
+            let light = results.settings.wavefront_light;
+            waves::point_images(model, light, spots, interrupted)
         },
         slot: |analyses| &mut analyses.point_images,
         known: None,

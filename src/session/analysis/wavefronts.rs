@@ -60,7 +60,7 @@ pub struct PointImage {
 }
 
 /// The number of columns of a map of the pupil.
-const MAP: usize = 61;
+const MAP: usize = 101;
 /// The number of columns of an image of a point.
 const IMAGE: usize = 41;
 /// The half width of an image in λF, and in RMS radii of the spot.
@@ -69,7 +69,7 @@ const WIDTH: [f64; 2] = [5.0, 2.5];
 /// next version of the design waits for them.
 const WIDEST: f64 = 15.0;
 /// The number of circles, the largest of which is as wide as the image.
-const CIRCLES: usize = 32;
+const CIRCLES: usize = 40;
 /// The shares of the light whose circles are marked in encircled energy.
 pub const ENERGY_SHARES: [f64; 2] = [0.5, 0.8];
 /// The number of Zernike coefficients.
@@ -81,12 +81,15 @@ const LOOKED_AT: Accuracy = Accuracy { tolerance: 1e-2, max_rays: 100_000 };
 /// The wavefronts of all fields; `None` if it was interrupted.
 pub(super) fn field_wavefronts(
     model: &RayModel,
-    wavelength: Option<usize>,
+    light: Option<ImageLight>,
     tolerance: f64,
     interrupted: &(dyn Fn() -> bool + Sync),
 ) -> Option<FieldWavefronts> {
     let accuracy = Accuracy { tolerance, ..Accuracy::default() };
-    let wavelength = present(model, wavelength).unwrap_or(model.primary);
+    let wavelength = match present(model, light) {
+        ImageLight::Wavelength(index) => index,
+        ImageLight::All => model.primary,
+    };
     let mut fields = Vec::with_capacity(model.fields.len());
     for field in &model.fields {
         if interrupted() {
@@ -100,12 +103,11 @@ pub(super) fn field_wavefronts(
 /// The images of a point at all fields; `None` if it was interrupted.
 pub(super) fn point_images(
     model: &RayModel,
-    wavelength: Option<usize>,
+    light: Option<ImageLight>,
     spots: &[Result<Spot, AnalysisError>],
     interrupted: &(dyn Fn() -> bool + Sync),
 ) -> Option<PointImages> {
-    let wavelength = present(model, wavelength);
-    let light = wavelength.map_or(ImageLight::All, ImageLight::Wavelength);
+    let light = present(model, light);
     let mut fields = Vec::with_capacity(model.fields.len());
     for (field, spot) in model.fields.iter().zip(spots) {
         if interrupted() {
@@ -114,13 +116,23 @@ pub(super) fn point_images(
         let half_width = half_width(model, spot);
         fields.push(time(|| point_image(model, *field, (light, half_width), interrupted)));
     }
-    let um = wavelength.map(|index| model.channels[index].um);
+    let um = match light {
+        ImageLight::Wavelength(index) => Some(model.channels[index].um),
+        ImageLight::All => None,
+    };
     (!interrupted()).then_some(PointImages { um, fields })
 }
 
-/// A wavelength that was chosen, if the model has it: another lens may have fewer.
-fn present(model: &RayModel, wavelength: Option<usize>) -> Option<usize> {
-    wavelength.filter(|index| *index < model.channels.len())
+/// The light that was chosen if the model has it, since another lens may have fewer wavelengths; else the primary
+/// one.
+fn present(model: &RayModel, light: Option<ImageLight>) -> ImageLight {
+    match light {
+        Some(ImageLight::Wavelength(index)) if index < model.channels.len() => {
+            ImageLight::Wavelength(index)
+        }
+        Some(ImageLight::All) if model.channels.len() > 1 => ImageLight::All,
+        _ => ImageLight::Wavelength(model.primary),
+    }
 }
 
 fn field_wavefront(

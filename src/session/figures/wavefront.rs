@@ -181,6 +181,17 @@ fn energy_curve(
     ChartCurve::new(name, color, std::iter::once((0.0, Some(0.0))).chain(circles))
 }
 
+/// Lines from the axis up to the curve at the radii of the circles that hold shares of the light.
+fn share_marks(name: &str, color: usize, radii: &[Option<Estimate>]) -> Vec<ChartCurve> {
+    let mark = |(share, radius): (&f64, &Option<Estimate>)| {
+        let radius = 1e3 * radius.as_ref()?.value;
+        let ends = [(radius, Some(0.0)), (radius, Some(*share))];
+        let name = format!("{name} radius of {:.0} %", 100.0 * share);
+        Some(ChartCurve::new(name, color, ends).dashed())
+    };
+    ENERGY_SHARES.iter().zip(radii).filter_map(mark).collect()
+}
+
 /// The radii of the circles that hold shares of the light.
 fn share_notes(name: &str, radii: &[Option<Estimate>]) -> Vec<String> {
     let note = |(share, radius): (&f64, &Option<Estimate>)| {
@@ -209,6 +220,7 @@ pub(super) fn energy(subject: &Subject<'_>) -> Option<AnalysisFigure> {
                 let perfect = radii.zip(image.perfect.iter().copied());
                 let limit = format!("{name} without aberrations");
                 curves.push(energy_curve(limit, i, perfect).dashed());
+                curves.extend(share_marks(&name, i, &image.share_radii));
                 notes.extend(share_notes(&name, &image.share_radii));
                 let error = image.energy.iter().map(|(_, share)| share.error).fold(0.0, f64::max);
                 notes.push(format!(
@@ -269,6 +281,7 @@ pub(super) fn ray_energy(subject: &Subject<'_>) -> Option<AnalysisFigure> {
                 curves.push(energy_curve(name.clone(), i, found.radii.iter().copied().zip(shares)));
                 let share_radii: Vec<_> =
                     found.image.share_radii.iter().copied().map(Some).collect();
+                curves.extend(share_marks(&name, i, &share_radii));
                 notes.extend(share_notes(&name, &share_radii));
                 let error = found.image.energy.iter().map(|share| share.error).fold(0.0, f64::max);
                 let rays = found.image.rays;

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use egui::{
-    Align, Button, Color32, ColorImage, ComboBox, Grid, Image, Layout, RichText, ScrollArea,
-    TextureHandle, TextureOptions, Ui, vec2,
+    Align, Button, Color32, ColorImage, ComboBox, Grid, Image, Layout, Rect, RichText, ScrollArea,
+    Sense, TextureHandle, TextureOptions, Ui, vec2,
 };
 
 use super::figure_view::{ChartForm, accuracy_section, bare_chart, export_menu};
@@ -12,7 +12,9 @@ use super::widgets::swatch;
 use super::{
     Panel, displayed_results, field_name, plain_error, relative_error, show_missing_results,
 };
-use crate::analysis::{Estimate, SquareGrid, ZernikeOrder, ZernikeSum, aberration_name};
+use crate::analysis::{
+    Estimate, ImageLight, SquareGrid, ZernikeOrder, ZernikeSum, aberration_name,
+};
 use crate::lens::Fields;
 use crate::pupil::RayModel;
 use crate::report::FigureKind;
@@ -29,9 +31,13 @@ use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 
 /// The least and the largest side of a map.
-const SIDE: [f32; 2] = [96.0, 260.0];
-/// The room for the words above and below a map.
+const SIDE: [f32; 2] = [96.0, 420.0];
+/// The room for the words above and below a map, and for its scale of colours.
 const WORDS: f32 = 66.0;
+const SCALE: f32 = 28.0;
+/// The height of the bar of such a scale, and its steps.
+const BAR: f32 = 8.0;
+const STEPS: usize = 64;
 /// The room between maps.
 const GAP: f32 = 10.0;
 /// The decades of a logarithmic image.
@@ -243,6 +249,35 @@ impl<'a> PageNumbers<'a> {
         .map_err(ToString::to_string)
     }
 
+    /// The scale of the colours of a map.
+    fn scale(self, ui: &mut Ui, field: usize, side: f32) {
+        let Self::Waves(waves) = self else { return };
+        let Ok(found) = &waves.value.fields[field].value else { return };
+        let (most, is_dark) = (largest(&found.map), ui.visuals().dark_mode);
+        let end = number::format_digits(most, 3);
+        color_scale(ui, side, [format!("-{end} λ"), format!("{end} λ")], |share| {
+            let [r, g, b] = colormap::diverging(2.0 * share - 1.0, is_dark);
+            Color32::from_rgb(r, g, b)
+        });
+    }
+
+    /// The meaning of the numbers below a picture.
+    const fn hint(self) -> &'static str {
+        match self {
+            Self::Waves(_) => {
+                "RMS without piston; P-V: the largest path difference less the smallest over the map. Paths are \
+                 compared with that of the chief ray on a sphere about its image point"
+            }
+            Self::Images(_) => {
+                "The Strehl ratio at the image point of the chief ray, and the largest one found in space: \
+                 \"locally best\" where not all of the blur was searched, as in the light of several wavelengths"
+            }
+            Self::Rays(_) => {
+                "The circles about the image point of the chief ray that hold these shares"
+            }
+        }
+    }
+
     /// The picture of a field; `None` if there is none.
     fn picture(self, field: usize, style: PictureStyle) -> Option<ColorImage> {
         match self {
@@ -318,29 +353,33 @@ impl WavefrontPanel {
         if model.channels.len() < 2 || self.kind() == NumberKind::RayImages {
             return;
         }
-        let shown = view.settings.wavefront_wavelength;
-        let shown = shown.filter(|index| *index < model.channels.len());
         let can_be_all = self.page.shows_images();
-        let shown = if can_be_all { shown } else { Some(shown.unwrap_or(model.primary)) };
-        let name = |index: Option<usize>| {
-            index
-                .map_or_else(|| "All wavelengths".to_owned(), |index| wavelength_name(model, index))
+        let shown = match view.settings.wavefront_light {
+            Some(ImageLight::Wavelength(index)) if index < model.channels.len() => {
+                ImageLight::Wavelength(index)
+            }
+            Some(ImageLight::All) if can_be_all => ImageLight::All,
+            _ => ImageLight::Wavelength(model.primary),
+        };
+        let name = |light: ImageLight| match light {
+            ImageLight::Wavelength(index) => wavelength_name(model, index),
+            ImageLight::All => "All wavelengths".to_owned(),
         };
         let mut chosen = shown;
         let combo = ComboBox::from_id_salt("wavefront wavelength").width(96.0);
         let combo = combo.selected_text(name(shown)).show_ui(ui, |ui| {
-            if can_be_all {
-                ui.selectable_value(&mut chosen, None, name(None));
-            }
             for index in 0..model.channels.len() {
                 let primary = if index == model.primary { ", primary" } else { "" };
-                let text = format!("{}{primary}", name(Some(index)));
-                ui.selectable_value(&mut chosen, Some(index), text);
+                let light = ImageLight::Wavelength(index);
+                ui.selectable_value(&mut chosen, light, format!("{}{primary}", name(light)));
+            }
+            if can_be_all {
+                ui.selectable_value(&mut chosen, ImageLight::All, name(ImageLight::All));
             }
         });
         named_list(ui, combo, "Wavelength of the wavefront");
         if chosen != shown {
-            actions.push(Command::Show(PanelSetting::WavefrontWavelength(chosen)));
+            actions.push(Command::Show(PanelSetting::WavefrontLight(Some(chosen))));
         }
     }
 
@@ -363,7 +402,7 @@ impl WavefrontPanel {
             (0..found.count()).map(texture).collect()
         });
         let count = textures.len().max(1) as f32;
-        let room = ui.available_size() - vec2(0.0, WORDS);
+        let room = ui.available_size() - vec2(0.0, WORDS + SCALE);
         let side = (room.x / count - GAP).min(room.y).clamp(SIDE[0], SIDE[1]);
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             let from_top = Layout::left_to_right(Align::Min).with_main_wrap(true);
@@ -424,7 +463,7 @@ type CellContent<'a> = (PageNumbers<'a>, Option<&'a TextureHandle>);
 /// A field, its picture and the numbers of it.
 fn cell(ui: &mut Ui, field: (&Fields, usize), content: CellContent<'_>, side: f32) {
     let from_top = Layout::top_down(Align::Min);
-    ui.allocate_ui_with_layout(vec2(side, side + WORDS), from_top, |ui| {
+    ui.allocate_ui_with_layout(vec2(side, side + WORDS + SCALE), from_top, |ui| {
         ui.set_width(side);
         let name = heading(ui, field.0, field.1);
         cell_content(ui, (&name, field.1), content, side);
@@ -455,9 +494,29 @@ fn cell_content(
         ui.add(Image::new(texture).fit_to_exact_size(vec2(side, side)).alt_text(words))
             .on_hover_text(format!("{rays} rays, {:.1} ms", found.ms(field)));
     }
+    found.scale(ui, field, side);
     for line in lines {
-        ui.label(RichText::new(line).small());
+        ui.label(RichText::new(line).small()).on_hover_text(found.hint());
     }
+}
+
+/// A bar of the colours of a scale with the numbers at its ends.
+fn color_scale(ui: &mut Ui, side: f32, ends: [String; 2], color: impl Fn(f64) -> Color32) {
+    let (bar, _) = ui.allocate_exact_size(vec2(side, BAR), Sense::hover());
+    let step = side / STEPS as f32;
+    for i in 0..STEPS {
+        let corner = bar.min + vec2(step * i as f32, 0.0);
+        // Steps overlap, so that no gap is seen between them.
+        let part = Rect::from_min_size(corner, vec2(1.5 * step, BAR)).intersect(bar);
+        ui.painter().rect_filled(part, 0.0, color((i as f64 + 0.5) / STEPS as f64));
+    }
+    ui.horizontal(|ui| {
+        let [low, high] = ends;
+        ui.label(RichText::new(low).small().weak());
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            ui.label(RichText::new(high).small().weak());
+        });
+    });
 }
 
 /// The name of a field with its colour.
@@ -483,16 +542,19 @@ fn estimate_text(estimate: Estimate, unit: &str) -> String {
 }
 
 fn map_lines(found: &FieldWavefront) -> Vec<String> {
-    let most = number::format_digits(largest(&found.map), 3);
+    let waves = || found.map.values.iter().flatten().copied();
+    let high = waves().fold(f64::NEG_INFINITY, f64::max);
+    let low = waves().fold(f64::INFINITY, f64::min);
     let rms = estimate_text(found.wavefront.rms, " λ");
-    vec![format!("RMS {rms}"), format!("within ± {most} λ")]
+    let range = number::format_digits((high - low).max(0.0), 3);
+    vec![format!("RMS {rms}"), format!("P-V {range} λ")]
 }
 
 fn image_lines(image: &PointImage) -> Vec<String> {
     let width = number::format_digits(2e3 * image.intensity.half_width, 3);
     vec![
-        format!("Strehl {}", estimate_text(image.strehl.at_chief, "")),
-        format!("{} {}", image.strehl.best_name(), estimate_text(image.strehl.best, "")),
+        format!("Strehl {} at the chief ray", estimate_text(image.strehl.at_chief, "")),
+        format!("{} Strehl {}", image.strehl.best_name(), estimate_text(image.strehl.best, "")),
         format!("{width} µm wide, intensity {}", plain_error(image.error, "")),
     ]
 }
@@ -547,9 +609,9 @@ fn energies(ui: &mut Ui, results: &AnalysisResults, kind: FigureKind) {
             }
         }
     });
-    if kind == FigureKind::Energy {
-        ui.label(RichText::new("dashed: without aberrations").small().weak());
-    }
+    let limit = if kind == FigureKind::Energy { "dashed curve: without aberrations; " } else { "" };
+    let marks = format!("{limit}upright: the radii of 50 % and 80 %");
+    ui.label(RichText::new(marks).small().weak());
     let height = (ui.available_height() - 24.0).max(SIDE[0]);
     for chart in figure.rows.iter().flatten() {
         if chart.curves.is_empty() {
