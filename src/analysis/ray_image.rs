@@ -21,14 +21,16 @@ pub struct RayImage {
     pub error: f64,
     /// The share of the light within circles about the centre; errors are absolute.
     pub energy: Vec<Estimate>,
+    /// The radii in mm of the circles about the centre that hold the shares of the light asked for.
+    pub share_radii: Vec<Estimate>,
     /// True if the shares are within the tolerance.
     pub reached: bool,
     /// The number of rays.
     pub rays: usize,
 }
 
-/// The request for an image by rays: the columns and the half width in mm of its grid, and the radii of the
-/// circles in mm.
+/// The request for an image by rays: the columns and the half width in mm of its grid, the radii of the
+/// circles in mm, and the shares of the light whose circles are looked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RayImageRequest<'a> {
     /// The number of columns and of rows, at least 2.
@@ -37,6 +39,8 @@ pub struct RayImageRequest<'a> {
     pub half_width: f64,
     /// The radii of the circles, in mm.
     pub radii: &'a [f64],
+    /// The shares of the light whose circles are looked for, between 0 and 1.
+    pub shares: &'a [f64],
 }
 
 /// The lowest order that is compared.
@@ -82,7 +86,7 @@ pub fn ray_image(
         let errors = before.as_ref().map(|before| sums.errors(before));
         let is_within = errors
             .as_ref()
-            .is_some_and(|(shares, _)| shares.iter().all(|error| *error <= accuracy.tolerance));
+            .is_some_and(|found| found.circles.iter().all(|error| *error <= accuracy.tolerance));
         let is_last = order + 1 == orders || rays >= accuracy.max_rays * lit.len();
         if let Some(errors) = errors.filter(|_| is_within || is_last) {
             return Ok(sums.image((center, request), errors, (is_within, rays)));
@@ -132,13 +136,56 @@ fn arrived_light(lit: &[(f64, &Region<'_>)], order: usize) -> ArrivedLight {
 struct LightSums {
     cells: Vec<f64>,
     circles: Vec<f64>,
+    /// The radii that hold shares, in mm.
+    share_radii: Vec<f64>,
+}
+
+/// The distances of rays from a point, ascending, with the share of the light up to each.
+struct RayDistances {
+    distances: Vec<f64>,
+    within: Vec<f64>,
+}
+
+impl RayDistances {
+    fn new(light: &ArrivedLight, [cx, cy]: [f64; 2]) -> Self {
+        let mut rays: Vec<[f64; 2]> =
+            light.points.iter().map(|[x, y, share]| [(x - cx).hypot(y - cy), *share]).collect();
+        rays.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let total: f64 = rays.iter().map(|ray| ray[1]).sum();
+        let mut sum = 0.0;
+        let mut up_to = |ray: &[f64; 2]| {
+            sum += ray[1] / total;
+            sum
+        };
+        let within = rays.iter().map(&mut up_to).collect();
+        Self { distances: rays.iter().map(|ray| ray[0]).collect(), within }
+    }
+
+    /// The distance up to which there is a share of the light.
+    fn radius(&self, share: f64) -> f64 {
+        let at = self.within.partition_point(|within| *within < share);
+        let last = self.distances.len().saturating_sub(1);
+        self.distances.get(at.min(last)).copied().unwrap_or(0.0)
+    }
+}
+
+/// The errors of sums.
+struct SumErrors {
+    circles: Vec<f64>,
+    density: f64,
+    share_radii: Vec<f64>,
 }
 
 impl LightSums {
     /// `None` without light.
     fn new(light: &ArrivedLight, [cx, cy]: [f64; 2], request: RayImageRequest<'_>) -> Option<Self> {
-        let RayImageRequest { count, half_width, radii } = request;
-        let mut sums = Self { cells: vec![0.0; count * count], circles: vec![0.0; radii.len()] };
+        let RayImageRequest { count, half_width, radii, shares } = request;
+        let distances = RayDistances::new(light, [cx, cy]);
+        let mut sums = Self {
+            cells: vec![0.0; count * count],
+            circles: vec![0.0; radii.len()],
+            share_radii: shares.iter().map(|share| distances.radius(*share)).collect(),
+        };
         let step = 2.0 * half_width / (count.max(2) - 1) as f64;
         let mut total = 0.0;
         for [x, y, share] in &light.points {
@@ -165,33 +212,40 @@ impl LightSums {
         self.cells.iter().copied().fold(0.0, f64::max)
     }
 
-    /// The largest error of the circles for each of them, and that of the largest density as a share of it.
-    fn errors(&self, before: &Self) -> (Vec<f64>, f64) {
+    /// The largest error of the circles for each of them, that of the largest density as a share of it, and those of
+    /// the radii of shares.
+    fn errors(&self, before: &Self) -> SumErrors {
         let change = |(a, b): (&f64, &f64)| CHANGES * (a - b).abs();
         // A circle jumps over whole rows of rays: that of one alone may stand still by chance.
         let circles = self.circles.iter().zip(&before.circles).map(change).fold(0.0, f64::max);
         let circles = vec![circles; self.circles.len()];
         let peak = self.peak().max(f64::MIN_POSITIVE);
         let cells = self.cells.iter().zip(&before.cells).map(change);
-        (circles, cells.fold(0.0, f64::max) / peak)
+        let density = cells.fold(0.0, f64::max) / peak;
+        let share_radii = self.share_radii.iter().zip(&before.share_radii).map(change).collect();
+        SumErrors { circles, density, share_radii }
     }
 
     fn image(
         self,
         (center, request): ([f64; 2], RayImageRequest<'_>),
-        (errors, error): (Vec<f64>, f64),
+        errors: SumErrors,
         (reached, rays): (bool, usize),
     ) -> RayImage {
-        let energy = self.circles.iter().zip(errors);
+        let energy = self.circles.iter().zip(errors.circles);
+        let share_radii = self.share_radii.iter().zip(errors.share_radii);
         RayImage {
             center,
             energy: energy.map(|(share, error)| Estimate::new(*share, error, rays)).collect(),
+            share_radii: share_radii
+                .map(|(radius, error)| Estimate::new(*radius, error, rays))
+                .collect(),
             density: SquareGrid {
                 count: request.count,
                 half_width: request.half_width,
                 values: self.cells,
             },
-            error,
+            error: errors.density,
             reached,
             rays,
         }
@@ -220,13 +274,20 @@ mod tests {
         let model = RayModel::from_lens(&lens, 0).unwrap();
         let radius = 5.0 * 10.0 / 100.0;
         let radii = [0.25, 0.5, 0.8, 1.1].map(|part| part * radius);
-        let request = RayImageRequest { count: 21, half_width: 0.6, radii: &radii };
+        let shares = [0.5, 0.8];
+        let request =
+            RayImageRequest { count: 21, half_width: 0.6, radii: &radii, shares: &shares };
         let accuracy = Accuracy { tolerance: 1e-2, ..Accuracy::default() };
         let found = ray_image(&model, model.fields[0], request, accuracy, &never).unwrap();
         for (radius_part, share) in [0.25, 0.5, 0.8, 1.1].into_iter().zip(&found.energy) {
             let exact = f64::min(radius_part * radius_part, 1.0);
             assert!((share.value - exact).abs() <= share.error.max(1e-12), "{share:?} {exact}");
             assert!(share.error <= 2e-2, "{share:?}");
+        }
+        for (share, found) in shares.into_iter().zip(&found.share_radii) {
+            let exact = radius * share.sqrt();
+            assert!((found.value - exact).abs() <= found.error, "{found:?} {exact}");
+            assert!(found.error < 0.05 * exact, "{found:?}");
         }
         let even = 1.0 / (std::f64::consts::PI * radius * radius);
         // The cells that the disc covers, and those beside it.

@@ -6,8 +6,8 @@
 use super::mtf::TransferMethod;
 use super::timing::time_median;
 use crate::analysis::{
-    AnalysisError, MtfCurve, TransferValue, airy_radius, grid_nodes, point_spread_unless,
-    polychromatic_diffraction_mtf_unless, polychromatic_geometric_mtf,
+    AnalysisError, ImageLight, MtfCurve, TransferValue, airy_radius, grid_nodes,
+    point_spread_unless, polychromatic_diffraction_mtf_unless, polychromatic_geometric_mtf,
 };
 use crate::lens::FieldPoint;
 use crate::pupil::{Accuracy, RayModel};
@@ -107,7 +107,8 @@ pub fn point_spread_accuracy(
     let points = grid_nodes(SPREAD_POINTS, SPREAD_WIDTH * airy);
     let trial = |tolerance: f64| {
         let accuracy = Accuracy { tolerance, ..Accuracy::default() };
-        let found = point_spread_unless(model, field, wavelength, &points, accuracy, interrupted)?;
+        let image = (ImageLight::Wavelength(wavelength), points.as_slice());
+        let found = point_spread_unless(model, field, image, accuracy, interrupted)?;
         let stated = found.intensities.iter().map(|at| at.error).fold(0.0, f64::max);
         let values = found.intensities.iter().map(|at| [at.value, 0.0]).collect();
         let Some(first) = found.intensities.first() else { return Err(AnalysisError::NoLight) };

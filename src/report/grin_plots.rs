@@ -4,8 +4,8 @@ use crate::grin::{GrinRay, GrinTracer, IndexField, plan_tracing};
 use crate::grin_design::{GrinField, GrinTask, LightSource, ViewImage};
 use crate::math::Vec3;
 use crate::plot::{
-    Axis, BLACK, Canvas, Chart, GREY, NamedPlot, PALETTE, Stroke, TextAlign, draw_image_row,
-    gray_level, gray_levels,
+    Axis, BLACK, Canvas, Chart, GREY, Legend, NamedPlot, PALETTE, Stroke, TextAlign,
+    draw_image_row, gray_level, gray_levels,
 };
 
 /// The number of cells along a side of the plot of a section.
@@ -42,13 +42,18 @@ fn plot_profile(task: &GrinTask, medium: &GrinField) -> Canvas {
     let found = along(medium.index_field());
     let exact = task.exact.as_ref().and_then(|exact| exact.field::<f64>().ok());
     let exact = exact.map(|field| along(&*field)).unwrap_or_default();
-    let mut canvas = Canvas::new([1000, 760]);
+    let mut canvas = Canvas::new([1240, 760]);
     let x = Axis::linear("x, mm", found.iter().map(|p| p[0]));
     let y = Axis::linear("index", found.iter().chain(&exact).map(|p| p[1]));
     let chart = Chart::new([120.0, 110.0], [940.0, 660.0], x, y);
     chart.draw(&mut canvas, &task.name);
     canvas.curve(&chart.to_pixels(&found), PALETTE[0], Stroke::Solid);
     canvas.curve(&chart.to_pixels(&exact), BLACK, Stroke::Dashed);
+    let mut legend = Legend::new([970.0, 120.0]);
+    legend.curve(&mut canvas, "found", PALETTE[0], Stroke::Solid);
+    if !exact.is_empty() {
+        legend.curve(&mut canvas, "exact", BLACK, Stroke::Dashed);
+    }
     canvas
 }
 

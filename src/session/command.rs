@@ -4,7 +4,7 @@ use super::analysis::{ContrastPage, FieldPage, PictureOptions, SceneFile};
 use super::grin_design::GrinCommand;
 use super::specified_design::SpecifiedDesignCommand;
 use super::structure_search::StructureSearchCommand;
-use crate::analysis::Coating;
+use crate::analysis::{Coating, ImageLight};
 use crate::effects::{Effect, EffectOverride};
 use crate::experiments::Effort;
 use crate::files::VignettingChoice;
@@ -223,6 +223,8 @@ pub enum PanelSetting {
     PointImages(bool),
     /// True to compute the images of a point by rays.
     RayImages(bool),
+    /// The light of images of a point, and of wavefronts where it is of one wavelength; `None` for the primary one.
+    WavefrontLight(Option<ImageLight>),
     /// True to compute the footprints of the fields.
     Footprints(bool),
     /// True to compute the spot over the whole field.

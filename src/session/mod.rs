@@ -36,11 +36,11 @@ mod view;
 pub use crate::tolerance::{LoosestGoal, LoosestTolerances};
 pub use analysis::{
     AccuracyCurves, AccuracyPoint, Analyses, AnalysisResults, AnalysisSettings, AsBuiltLens,
-    ContrastPage, FieldContrast, FieldContrastCurves, FieldContrasts, FieldFans, FieldFootprints,
-    FieldGhosts, FieldPage, FieldPathFans, FieldPupils, FieldRayImage, FieldWavefront,
-    FieldWavefronts, FocusContrasts, PictureEffect, PictureFocus, PictureOptions, PictureScene,
-    PointImage, PointImages, RayImages, SceneFile, ScenePicture, analyze, confirm_as_built,
-    predict_as_built,
+    ContrastPage, ENERGY_SHARES, FieldContrast, FieldContrastCurves, FieldContrasts, FieldFans,
+    FieldFootprints, FieldGhosts, FieldPage, FieldPathFans, FieldPupils, FieldRayImage,
+    FieldWavefront, FieldWavefronts, FocusContrasts, PictureEffect, PictureFocus, PictureOptions,
+    PictureScene, PointImage, PointImages, RayImages, SceneFile, ScenePicture, analyze,
+    confirm_as_built, predict_as_built,
 };
 pub use clock::Timed;
 pub use command::{Command, PanelSetting};

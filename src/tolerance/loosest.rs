@@ -32,6 +32,19 @@ impl LoosestGoal {
             Self::Yield { rms, .. } => Some(rms),
         }
     }
+
+    /// Refuses a goal that the lens without errors does not reach, by the form of its errors alone.
+    ///
+    /// # Errors
+    /// [`ToleranceError::BelowNominal`].
+    pub fn check(self, form: &QuadraticForm) -> Result<(), ToleranceError> {
+        let (Self::Rms(found) | Self::Yield { rms: found, .. }) = self;
+        let nominal = form.as_designed();
+        if found * found > nominal {
+            return Ok(());
+        }
+        Err(ToleranceError::BelowNominal { found, nominal: nominal.sqrt() })
+    }
 }
 
 /// The aim of the loosest tolerances and their confirmation.

@@ -1012,6 +1012,28 @@ fn a_ghost_of_the_list_is_shown_in_the_layout() {
     assert!(layout.state().commands.contains(&hidden), "{:?}", layout.state().commands);
 }
 
+/// The wavelength of wavefronts and images is chosen in a list: of images all of them too.
+#[test]
+fn the_wavelength_of_wavefronts_can_be_chosen() {
+    let shown = results_with(PanelSetting::Wavefronts(true), |all| all.wavefronts.is_some());
+    let mut harness = panel_harness(WavefrontPanel::default(), shown);
+    harness.run_steps(3);
+    harness.get_by_label("Wavelength of the wavefront").click();
+    harness.run_steps(3);
+    assert!(harness.query_by_label("All wavelengths").is_none());
+    harness.get_by_label("486.1 nm").click();
+    harness.run_steps(3);
+    let chosen = Command::Show(PanelSetting::WavefrontLight(Some(
+        aplanat::analysis::ImageLight::Wavelength(0),
+    )));
+    assert!(harness.state().commands.contains(&chosen), "{:?}", harness.state().commands);
+    harness.get_by_label("Encircled energy").click();
+    harness.run_steps(3);
+    harness.get_by_label("Wavelength of the wavefront").click();
+    harness.run_steps(3);
+    assert!(harness.get_all_by_label("All wavelengths").count() > 0);
+}
+
 /// Every page of the wavefront panel shows every field, with the numbers of the analyses. Images of a point are
 /// asked for by the pages that show them, and no longer by the others.
 #[test]

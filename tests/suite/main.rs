@@ -60,6 +60,7 @@ mod picture_scenes;
 mod pictures;
 mod placed_points;
 mod plume;
+mod polychromatic_images;
 mod projected_light;
 mod pupil;
 mod pupil_limits;

@@ -71,7 +71,7 @@ fn backward_images_of_points_are_as_large_as_forward_ones() {
         let found = points.images[row].as_ref().unwrap();
         let [_, y] = frame.at_share([0.5, (row as f64 + 0.5) / 3.0]);
         let field = field_at(&model, y);
-        let request = RayImageRequest { count: 161, half_width: 1.5, radii: &[] };
+        let request = RayImageRequest { count: 161, half_width: 1.5, radii: &[], shares: &[] };
         let accuracy = Accuracy { tolerance: 1e-3, max_rays: 60_000 };
         let forward = ray_image(&model, field, request, accuracy, &|| false).unwrap();
         let expected = half_light(&forward.density);

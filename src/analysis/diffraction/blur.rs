@@ -9,7 +9,7 @@
 //! local maximum of the grid that may be the peak then.
 
 use super::Interruption;
-use super::brightest::{brightest, climb, third_cosine};
+use super::brightest::{ImageIntensity as _, brightest, climb, third_cosine};
 use super::pupil_samples::{NODES_PER_TURN, PupilSamples};
 use super::pupil_traces::TracedLight;
 use crate::analysis::AnalysisError;

@@ -8,11 +8,28 @@ use std::f64::consts::TAU;
 const STEPS: usize = 30;
 const HALVINGS: usize = 12;
 
+/// The intensity of an image in space, over the peak of a perfect one; points in mm.
+pub(super) trait ImageIntensity {
+    /// The intensity at a point off the image plane.
+    fn intensity_at(&self, point: [f64; 3]) -> f64;
+
+    /// The gradient and the second derivatives of the intensity at a point.
+    fn slopes_at(&self, point: [f64; 3]) -> (Vector3<f64>, Matrix3<f64>);
+}
+
 /// The brightest point found from some points, from the one where the path differences vary least, and from
 /// the image point of the chief ray.
 pub(super) fn brightest(light: &PupilSamples, starts: &[[f64; 3]]) -> [f64; 3] {
     let others = [least_variance(light).unwrap_or([0.0; 3]), [0.0; 3]];
-    let ends = starts.iter().chain(&others).map(|start| climb(light, *start));
+    highest(light, starts.iter().chain(&others))
+}
+
+/// The brightest of the points that are reached uphill from some points.
+pub(super) fn highest<'a>(
+    light: &impl ImageIntensity,
+    starts: impl Iterator<Item = &'a [f64; 3]>,
+) -> [f64; 3] {
+    let ends = starts.map(|start| climb(light, *start));
     let with_value = ends.map(|end| (end, light.intensity_at(end)));
     with_value.max_by(|a, b| a.1.total_cmp(&b.1)).map_or([0.0; 3], |(end, _)| end)
 }
@@ -33,7 +50,7 @@ fn least_variance(light: &PupilSamples) -> Option<[f64; 3]> {
 }
 
 /// Newton's method on the intensity, uphill.
-pub(super) fn climb(light: &PupilSamples, start: [f64; 3]) -> [f64; 3] {
+pub(super) fn climb(light: &impl ImageIntensity, start: [f64; 3]) -> [f64; 3] {
     let mut here = Vector3::from(start);
     let mut value = light.intensity_at(start);
     for _ in 0..STEPS {
@@ -51,7 +68,7 @@ pub(super) fn climb(light: &PupilSamples, start: [f64; 3]) -> [f64; 3] {
 
 /// The first point along a step, halved again and again, at which the intensity is above `value`.
 fn brighter_point(
-    light: &PupilSamples,
+    light: &impl ImageIntensity,
     here: Vector3<f64>,
     value: f64,
     step: Vector3<f64>,
@@ -71,22 +88,12 @@ fn uphill(gradient: Vector3<f64>, curvature: Matrix3<f64>) -> Option<Vector3<f64
     step.iter().all(|v| v.is_finite()).then_some(step)
 }
 
-impl PupilSamples {
-    /// The cosines over the wavelength of a sample, and of its mirror image if it stands for that too.
-    fn rows(&self, i: usize) -> impl Iterator<Item = [f64; 3]> + use<> {
-        let [a, b] = self.cosines[i];
-        let row = [a, b, third_cosine([a, b])].map(|cosine| cosine / self.wavelength);
-        let mirror = [-row[0], row[1], row[2]];
-        std::iter::once(row).chain(self.mirrored.then_some(mirror))
-    }
-
-    /// The intensity at a point off the image plane.
-    pub(super) fn intensity_at(&self, point: [f64; 3]) -> f64 {
+impl ImageIntensity for PupilSamples {
+    fn intensity_at(&self, point: [f64; 3]) -> f64 {
         let [re, im] = self.field_and_slopes(point).0;
         (re * re + im * im) / self.peak().powi(2)
     }
 
-    /// The gradient and the second derivatives of the intensity at a point.
     fn slopes_at(&self, point: [f64; 3]) -> (Vector3<f64>, Matrix3<f64>) {
         let (u, first, second) = self.field_and_slopes(point);
         let scale = 2.0 / self.peak().powi(2);
@@ -94,6 +101,16 @@ impl PupilSamples {
         let products = first.each_ref().map(|part| part * part.transpose());
         let curvature = (products[0] + products[1] + second[0] * u[0] + second[1] * u[1]) * scale;
         (gradient, curvature)
+    }
+}
+
+impl PupilSamples {
+    /// The cosines over the wavelength of a sample, and of its mirror image if it stands for that too.
+    fn rows(&self, i: usize) -> impl Iterator<Item = [f64; 3]> + use<> {
+        let [a, b] = self.cosines[i];
+        let row = [a, b, third_cosine([a, b])].map(|cosine| cosine / self.wavelength);
+        let mirror = [-row[0], row[1], row[2]];
+        std::iter::once(row).chain(self.mirrored.then_some(mirror))
     }
 
     /// The field at a point with its first and second derivatives: real and imaginary parts.

@@ -1,15 +1,41 @@
 //! Encircled energy: the share of the light within a circle.
 
+use super::image_light::{ColorPart, ColorParts, ImageLight, about_sphere};
 use super::pupil_function::PupilFunction;
 use super::pupil_samples::{Complex, PupilSamples};
 use super::{Interruption, never};
 use crate::analysis::reference_sphere::ReferenceSphere;
 use crate::analysis::{AnalysisError, Estimate, lit_region};
 use crate::lens::FieldPoint;
+use crate::math::Vec3;
 use crate::math::quadrature::gauss_legendre;
-use crate::pupil::{Accuracy, RayModel};
+use crate::pupil::{Accuracy, ConvergedList, RayModel};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
+
+/// A request for encircled energy: circles about a point, x and y in mm from the image point of the chief ray.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EncircledRequest<'a> {
+    /// The point.
+    pub center: [f64; 2],
+    /// The radii of the circles in mm, ascending.
+    pub radii: &'a [f64],
+    /// The shares of the light whose circles are looked for, between 0 and 1.
+    pub shares: &'a [f64],
+}
+
+/// The shares of the light of a field within circles.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EncircledEnergy {
+    /// The share within each circle; errors are absolute.
+    pub energy: Vec<Estimate>,
+    /// The same of the same pupil without aberrations and lateral colour: the limit that diffraction sets.
+    pub perfect: Vec<Estimate>,
+    /// The radii in mm of the circles that hold the shares asked for; `None` beyond the largest circle.
+    pub share_radii: Vec<Option<Estimate>>,
+    /// The share of the weight of wavelengths without light, which are left out.
+    pub dark_share: f64,
+}
 
 /// The share of the light of a field at a wavelength within circles of these radii in mm, ascending,
 /// about a point, x and y in mm from the image point of the chief ray; errors are absolute.
@@ -24,30 +50,171 @@ pub fn encircled_energy(
     radii: &[f64],
     accuracy: Accuracy,
 ) -> Result<Vec<Estimate>, AnalysisError> {
-    encircled_energy_unless(model, field, wavelength, (center, radii), accuracy, &never)
+    let request = EncircledRequest { center, radii, shares: &[] };
+    let found = color_rings((model, field, wavelength), (None, request), accuracy, &never)?;
+    Ok(found.shares)
 }
 
-/// The same unless it is interrupted, which is asked for before every ring of the image.
+/// The shares of the light of a field in one or all wavelengths within circles, unless it is interrupted, which is
+/// asked for before every ring of the image. Over several wavelengths the circles are those about the image point
+/// of the chief ray of the primary one, and errors count the wavelengths that are refused.
 ///
 /// # Errors
-/// The same, and [`AnalysisError::Interrupted`].
+/// The field is dark or its pupil folds at every wavelength, or [`AnalysisError::Interrupted`].
 pub fn encircled_energy_unless(
     model: &RayModel,
     field: FieldPoint,
-    wavelength: usize,
-    (center, radii): ([f64; 2], &[f64]),
+    (light, request): (ImageLight, EncircledRequest<'_>),
+    accuracy: Accuracy,
+    interrupted: &Interruption<'_>,
+) -> Result<EncircledEnergy, AnalysisError> {
+    let origin = light.origin(model, field)?;
+    let colors = light.parts(model, |wavelength| {
+        let subject = (model, field, wavelength);
+        let rings = color_rings(subject, (origin, request), accuracy, interrupted)?;
+        Ok((rings, perfect_rings(subject, request.radii, accuracy, interrupted)?))
+    })?;
+    let count = request.radii.len();
+    let energy = mean_shares(&colors, count, |(rings, _)| &rings.shares);
+    let perfect = mean_shares(&colors, count, |(_, perfect)| perfect);
+    let share_radii = request.shares.iter().map(|share| {
+        RingSearch { colors: &colors, energy: &energy, radii: request.radii }.radius_of(*share)
+    });
+    Ok(EncircledEnergy {
+        share_radii: share_radii.collect(),
+        dark_share: colors.dark_share,
+        energy,
+        perfect,
+    })
+}
+
+/// The shares of one wavelength within circles, and its light, with which more of them are found.
+struct ColorRings {
+    shares: Vec<Estimate>,
+    light: RingLight,
+}
+
+/// The rings and the circles without aberrations of a wavelength.
+type ColorShares = (ColorRings, Vec<Estimate>);
+
+/// A share that is not resolved is between none and all.
+fn share_estimate(found: &ConvergedList, k: usize) -> Estimate {
+    Estimate::new(found.values[k].clamp(0.0, 1.0), found.errors[k].min(1.0), found.rays)
+}
+
+fn color_rings(
+    (model, field, wavelength): (&RayModel, FieldPoint, usize),
+    (origin, request): (Option<Vec3<f64>>, EncircledRequest<'_>),
+    accuracy: Accuracy,
+    interrupted: &Interruption<'_>,
+) -> Result<ColorRings, AnalysisError> {
+    let region = lit_region(model, field, wavelength)?;
+    let sphere = ReferenceSphere::for_region(&region)?;
+    let [x, y] = request.center;
+    let [x, y, _] = about_sphere(&sphere, origin, [x, y, 0.0]);
+    let mut last = None;
+    let encircled = |light: &PupilSamples| {
+        let rings = light.ring_light([x, y]);
+        let shares = rings.encircled_unless(request.radii, interrupted);
+        last = Some(rings);
+        shares
+    };
+    let found = PupilSamples::converge(&region, &sphere, None, accuracy, interrupted, encircled)?;
+    let shares = (0..request.radii.len()).map(|k| share_estimate(&found, k)).collect();
+    Ok(ColorRings { shares, light: last.ok_or(AnalysisError::NoLight)? })
+}
+
+/// The shares of the light of a pupil without aberrations within circles.
+fn perfect_rings(
+    (model, field, wavelength): (&RayModel, FieldPoint, usize),
+    radii: &[f64],
     accuracy: Accuracy,
     interrupted: &Interruption<'_>,
 ) -> Result<Vec<Estimate>, AnalysisError> {
     let region = lit_region(model, field, wavelength)?;
     let sphere = ReferenceSphere::for_region(&region)?;
-    let encircled = |light: &PupilSamples| light.encircled_unless(center, radii, interrupted);
-    let found = PupilSamples::converge(&region, &sphere, None, accuracy, interrupted, encircled)?;
-    // A share that is not resolved is between none and all.
-    let estimate = |k: usize| {
-        Estimate::new(found.values[k].clamp(0.0, 1.0), found.errors[k].min(1.0), found.rays)
+    let encircled = |light: &PupilSamples| {
+        let waves = vec![0.0; light.waves.len()];
+        let perfect = PupilSamples { waves, ..light.clone() };
+        perfect.ring_light([0.0; 2]).encircled_unless(radii, interrupted)
     };
-    Ok((0..radii.len()).map(estimate).collect())
+    let found = PupilSamples::converge(&region, &sphere, None, accuracy, interrupted, encircled)?;
+    Ok((0..radii.len()).map(|k| share_estimate(&found, k)).collect())
+}
+
+/// The mean of the shares of all wavelengths by their light; errors count those that are refused.
+fn mean_shares(
+    colors: &ColorParts<ColorShares>,
+    count: usize,
+    of: impl Fn(&ColorShares) -> &Vec<Estimate>,
+) -> Vec<Estimate> {
+    let ColorParts { parts, refused_share, .. } = colors;
+    let rays = parts.iter().map(|part| of(&part.found).first().map_or(0, |share| share.rays)).sum();
+    let mean = |number: &dyn Fn(&ColorShares) -> f64| -> f64 {
+        parts.iter().map(|part| part.share * number(&part.found)).sum()
+    };
+    let share = |k: usize| {
+        let error = mean(&|found| of(found)[k].error) + refused_share;
+        Estimate::new(mean(&|found| of(found)[k].value), error.min(1.0), rays)
+    };
+    (0..count).map(share).collect()
+}
+
+/// The search for the circles that hold shares of the light.
+struct RingSearch<'a> {
+    colors: &'a ColorParts<ColorShares>,
+    energy: &'a [Estimate],
+    radii: &'a [f64],
+}
+
+/// The steps of Newton's method to a radius, and the change of it by the radius at which they end.
+const RADIUS_STEPS: usize = 20;
+const RADIUS_CHANGE: f64 = 1e-9;
+
+impl RingSearch<'_> {
+    /// The radius of the circle that holds a share: between two circles that are known, by the light of the rings
+    /// between them. Its error is that of the shares over their slope.
+    fn radius_of(&self, share: f64) -> Option<Estimate> {
+        let above = self.energy.iter().position(|circle| circle.value >= share)?;
+        let outer = self.radii[above];
+        let (inner, inside, error) = match above.checked_sub(1) {
+            Some(k) => {
+                let inside = self.energy[k];
+                (self.radii[k], inside.value, inside.error.max(self.energy[above].error))
+            }
+            None => (0.0, 0.0, self.energy[above].error),
+        };
+        let between = self.energy[above].value - inside;
+        let mut bracket = [inner, outer];
+        let mut radius = inner + (outer - inner) * ((share - inside) / between).clamp(0.0, 1.0);
+        for _ in 0..RADIUS_STEPS {
+            let missing = share - inside - self.between(inner, radius);
+            bracket[usize::from(missing <= 0.0)] = radius;
+            let newton = radius + missing / self.slope(radius);
+            let [low, high] = bracket;
+            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+            let change = (next - radius).abs();
+            radius = next;
+            if change <= RADIUS_CHANGE * radius {
+                break;
+            }
+        }
+        // What the shares leave open moves the radius by no more than to the next circles of the shares.
+        let error = (error / self.slope(radius)).min(outer);
+        Some(Estimate::new(radius, error, self.energy[above].rays))
+    }
+
+    /// The share of the light between two radii.
+    fn between(&self, from: f64, to: f64) -> f64 {
+        let of = |part: &ColorPart<ColorShares>| part.share * part.found.0.light.between(from, to);
+        self.colors.parts.iter().map(of).sum()
+    }
+
+    /// The share of the light by the radius, in 1/mm.
+    fn slope(&self, radius: f64) -> f64 {
+        let of = |part: &ColorPart<ColorShares>| part.share * part.found.0.light.slope(radius);
+        self.colors.parts.iter().map(of).sum()
+    }
 }
 
 /// The absolute error of a contrast under the integral of encircled energy.
@@ -124,41 +291,25 @@ fn bessel_j1(x: f64) -> f64 {
 /// The nodes of a radius for each fringe of the pattern that it crosses, and at least.
 const FRINGE_NODES: f64 = 3.0;
 const LEAST_NODES: usize = 8;
+/// The part of a fringe that fewer nodes resolve to the rounding of numbers, and these.
+const FEW_FRINGES: f64 = 0.3;
+const FEW_NODES: usize = 6;
 
 impl PupilSamples {
     /// The share of the energy within circles about a point.
     pub fn encircled(&self, center: [f64; 2], radii: &[f64]) -> Vec<f64> {
         // What never is interrupted never fails.
-        self.encircled_unless(center, radii, &never).unwrap_or_default()
+        self.ring_light(center).encircled_unless(radii, &never).unwrap_or_default()
     }
 
-    fn encircled_unless(
-        &self,
-        center: [f64; 2],
-        radii: &[f64],
-        interrupted: &Interruption<'_>,
-    ) -> Result<Vec<f64>, AnalysisError> {
-        // ∫ |U|² dx dy over the whole plane is λ² ∫ A² dα dβ (Parseval).
-        let total = self.wavelength.powi(2) * self.energy();
-        let spread = self.spread();
-        let (mut nodes, mut ends, mut from) = (Vec::new(), Vec::new(), 0.0);
-        for radius in radii {
-            let fringes = 2.0 * spread * (radius - from) / self.wavelength;
-            let count = LEAST_NODES + (FRINGE_NODES * fringes) as usize;
-            nodes.extend(gauss_legendre(count, from, *radius));
-            ends.push(nodes.len());
-            from = *radius;
+    /// The light about a point of the image.
+    fn ring_light(&self, center: [f64; 2]) -> RingLight {
+        RingLight {
+            waves: self.polar_waves(center),
+            // ∫ |U|² dx dy over the whole plane is λ² ∫ A² dα dβ (Parseval).
+            total: self.wavelength.powi(2) * self.energy(),
+            fringes: 2.0 * self.spread() / self.wavelength,
         }
-        let waves = self.polar_waves(center);
-        let part = |(r, weight): &(f64, f64)| {
-            if interrupted() {
-                return Err(AnalysisError::Interrupted);
-            }
-            Ok(weight * TAU * r * ring_intensity(&waves, *r))
-        };
-        let parts: Vec<f64> = nodes.par_iter().map(part).collect::<Result<_, _>>()?;
-        let share = |end: &usize| parts[..*end].iter().sum::<f64>() / total;
-        Ok(ends.iter().map(share).collect())
     }
 
     /// The light of every point of the pupil as a plane wave about a point of the image. A common inclination
@@ -187,6 +338,57 @@ impl PupilSamples {
             PolarWave { wave_number: wave_number * length, direction, even, odd }
         };
         self.cosines.iter().zip(&self.waves).zip(&self.amplitudes).map(wave).collect()
+    }
+}
+
+/// The light of a pupil about a point of the image.
+struct RingLight {
+    waves: Vec<PolarWave>,
+    /// The integral of the intensity over the whole plane.
+    total: f64,
+    /// The fringes of the pattern along a radius, in 1/mm.
+    fringes: f64,
+}
+
+impl RingLight {
+    fn encircled_unless(
+        &self,
+        radii: &[f64],
+        interrupted: &Interruption<'_>,
+    ) -> Result<Vec<f64>, AnalysisError> {
+        let (mut nodes, mut ends, mut from) = (Vec::new(), Vec::new(), 0.0);
+        for radius in radii {
+            nodes.extend(self.nodes(from, *radius));
+            ends.push(nodes.len());
+            from = *radius;
+        }
+        let part = |(r, weight): &(f64, f64)| {
+            if interrupted() {
+                return Err(AnalysisError::Interrupted);
+            }
+            Ok(weight * self.slope(*r))
+        };
+        let parts: Vec<f64> = nodes.par_iter().map(part).collect::<Result<_, _>>()?;
+        let share = |end: &usize| parts[..*end].iter().sum::<f64>();
+        Ok(ends.iter().map(share).collect())
+    }
+
+    /// The radii that resolve the fringes between two, with their weights.
+    fn nodes(&self, from: f64, to: f64) -> Vec<(f64, f64)> {
+        let fringes = self.fringes * (to - from);
+        let least = if fringes < FEW_FRINGES { FEW_NODES } else { LEAST_NODES };
+        gauss_legendre(least + (FRINGE_NODES * fringes) as usize, from, to)
+    }
+
+    /// The share of the light by the radius of a circle, in 1/mm.
+    fn slope(&self, radius: f64) -> f64 {
+        TAU * radius * ring_intensity(&self.waves, radius) / self.total
+    }
+
+    /// The share of the light between two circles.
+    fn between(&self, from: f64, to: f64) -> f64 {
+        let part = |(radius, weight): (f64, f64)| weight * self.slope(radius);
+        self.nodes(from, to).into_par_iter().map(part).sum()
     }
 }
 

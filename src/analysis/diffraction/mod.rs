@@ -20,6 +20,7 @@ mod brightest;
 mod column_sum;
 mod contrast;
 mod encircled;
+mod image_light;
 mod outline;
 mod overlap;
 mod overlap_slopes;
@@ -43,7 +44,8 @@ pub use contrast::{
     DiffractionGate, diffraction_gate, diffraction_mtf, polychromatic_diffraction_mtf,
     polychromatic_diffraction_mtf_unless, through_focus_mtf,
 };
-pub use encircled::{encircled_energy, encircled_energy_unless};
+pub use encircled::{EncircledEnergy, EncircledRequest, encircled_energy, encircled_energy_unless};
+pub use image_light::ImageLight;
 pub use outline::PupilCurve;
 pub use point_spread::{PointSpread, point_spread, point_spread_unless};
 pub use pupil_function::PupilFunction;

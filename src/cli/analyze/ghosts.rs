@@ -151,18 +151,29 @@ impl TextLines for GhostsJson {
         let bar = |(rank, (ghost, value)): (usize, (&GhostJson, &f64))| {
             let number = |surface: usize| SurfaceNumber::new(surface);
             let [first, second] = [ghost.first_reflection, ghost.second_reflection].map(number);
-            let (name, color) = if rank < NAMED {
-                (format!("surfaces {first}, {second}"), rank)
+            let place = rank as f64 + 1.0;
+            let [left, right] = [place - HALF_BAR, place + HALF_BAR];
+            let outline = [[left, floor], [left, *value], [right, *value], [right, floor]];
+            let outline = outline.map(|[x, y]| (x, Some(y)));
+            if rank < NAMED {
+                ChartCurve::new(format!("surfaces {first}, {second}"), rank, outline)
             } else {
-                ("others".to_owned(), NAMED)
-            };
-            ChartCurve::bars(name, color, &[[rank as f64 + 1.0, *value]], floor)
+                ChartCurve::new(OTHERS, 0, outline).neutral()
+            }
         };
-        let curves = lit().zip(&logarithms).enumerate().map(bar).collect();
+        let mut curves: Vec<ChartCurve> = lit().zip(&logarithms).enumerate().map(bar).collect();
+        // The axis has room beside the first and the last bar.
+        if let Some(name) = curves.first().map(|curve| curve.name.clone()) {
+            let ends = [0.0, curves.len() as f64 + 1.0].map(|rank| (rank, Some(floor)));
+            curves.push(ChartCurve::new(name, 0, ends).neutral());
+        }
         vec![CurveChart::new("ghosts", ["rank", "lg irradiance"], curves)]
     }
 }
 
+/// Half the width of a bar, and the name of those without a colour of their own.
+const HALF_BAR: f64 = 0.3;
+const OTHERS: &str = "others";
 /// The number of ghosts with a colour of their own.
 const NAMED: usize = 7;
 

@@ -7,11 +7,14 @@ mod color;
 mod contrast;
 mod contrast_over_field;
 mod csv;
+mod encircled;
 mod fan;
 mod field_charts;
 mod focus;
 mod ghosts;
 mod illumination;
+mod light;
+mod options;
 mod point_spread;
 mod ray_image;
 mod seidel;
@@ -26,7 +29,7 @@ use super::failures::Failures;
 use super::input::{LensFile, LoadedLens, Tolerance};
 use super::output::{Output, ShortNumber, counted, without_rounding};
 use super::output_paths::OutputPaths;
-use crate::analysis::{AnalysisError, Coating, ContrastLimit, Estimate};
+use crate::analysis::{AnalysisError, Coating, ContrastLimit, Estimate, ImageLight};
 use crate::effects::{self, Effect, EffectPlan, TracePurpose};
 use crate::files;
 use crate::lens::{FieldKind, FieldPoint, SurfaceNumber};
@@ -35,6 +38,7 @@ use crate::plot::CurveChart;
 use crate::pupil::{Accuracy, RayModel};
 use crate::trace::{Fate, Fates};
 use clap::ValueEnum;
+use light::AskedLight;
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::fmt::{self, Display};
@@ -51,32 +55,39 @@ pub(super) struct AnalyzeArgs {
     what: AnalysisKind,
 
     /// Tolerance: `0.1%` or `1e-3`; relative for radii, the RMS wavefront and `illumination`; absolute for
-    /// contrast, for intensities over the perfect peak, for shares of the light and for coefficients in wavelengths
-    #[arg(long, default_value = "0.1%", value_name = "TOLERANCE")]
-    error: Tolerance,
+    /// contrast, for intensities over the perfect peak, for shares of the light and for coefficients in wavelengths;
+    /// absent: 0.1%
+    #[arg(long, value_name = "TOLERANCE")]
+    error: Option<Tolerance>,
 
     /// Only this field, in the unit of the lens's fields; absent: all fields
     #[arg(long, value_name = "Y", allow_negative_numbers = true)]
     field: Option<f64>,
 
+    /// The light of `wavefront`, `opd-fan`, `zernike`, `psf` and `encircled-energy`: a wavelength of the lens in um,
+    /// primary, or all of them by their weights (the last two analyses only); absent: primary
+    #[arg(long, value_name = "UM")]
+    wavelength: Option<AskedLight>,
+
     /// The zoom position, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     zoom: usize,
 
-    /// Spatial frequencies of `mtf`, `field-mtf` and `through-focus-mtf`, in cycles/mm
-    #[arg(long, value_name = "NU", value_delimiter = ',', default_value = "10,20,30,40,50")]
-    frequencies: Vec<f64>,
+    /// Spatial frequencies of `mtf`, `field-mtf` and `through-focus-mtf` (the first one), in cycles/mm; absent:
+    /// 10,20,30,40,50
+    #[arg(long, value_name = "NU", value_delimiter = ',')]
+    frequencies: Option<Vec<f64>>,
 
     /// The surface of `footprint`, counted from 1; absent: the first
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    surface: usize,
+    #[arg(long, value_name = "N")]
+    surface: Option<usize>,
 
     /// A point of `psf`, as `x,y` in mm from the image point of the chief ray, or of the image for
     /// `illumination`, from the axis; may be repeated
     #[arg(long = "at", value_name = "X,Y", value_parser = parse_point, allow_hyphen_values = true)]
     points: Vec<[f64; 2]>,
 
-    /// The distance in um from the image point of the chief ray that --plot of `psf` reaches; absent: 5 lambda F,
+    /// The distance in um from the image point of the chief ray that the --plot of `psf` reaches; absent: 5 lambda F,
     /// or the circle with 99 % of the rays where that is larger
     #[arg(long, value_name = "UM", requires = "plot")]
     reach: Option<f64>,
@@ -87,7 +98,7 @@ pub(super) struct AnalyzeArgs {
     pupil_points: Vec<[f64; 2]>,
 
     /// The radii of the circles of `encircled-energy` and `geometric-energy` in mm; absent: ten, up to 6 lambda F
-    /// or all of the spot
+    /// or what holds 95 % of the light if that is within 30 lambda F, or up to all of the spot
     #[arg(long, value_name = "MM", value_delimiter = ',')]
     radii: Vec<f64>,
 
@@ -102,23 +113,18 @@ pub(super) struct AnalyzeArgs {
     distance: Option<f64>,
 
     /// The coating of `ghosts` between air and glass: none, single-layer, v, a reflected share as `0.3%`, or layers
-    /// from the air as index:nm, `1.38:125.9+2.05:19.4`
-    #[arg(long, value_name = "COATING", default_value = "none", value_parser = parse_coating)]
-    coating: Coating,
+    /// from the air as index:nm, `1.38:125.9+2.05:19.4`; absent: none
+    #[arg(long, value_name = "COATING", value_parser = parse_coating)]
+    coating: Option<Coating>,
 
-    /// The number of pairs of `ghosts` that real rays follow, the brightest by first-order optics
-    #[arg(long, value_name = "N", default_value_t = 45)]
-    ghosts: usize,
+    /// The number of pairs of `ghosts` that real rays follow, the brightest by first-order optics; absent: 45
+    #[arg(long, value_name = "N")]
+    ghosts: Option<usize>,
 
-    /// The temperatures of `thermal` in degrees C; the prescription is that of 20 unless the lens says another
-    #[arg(
-        long,
-        value_name = "C",
-        value_delimiter = ',',
-        allow_hyphen_values = true,
-        default_value = "-20,0,20,40,60"
-    )]
-    temperatures: Vec<f64>,
+    /// The temperatures of `thermal` in degrees C; the prescription is that of 20 unless the lens says another;
+    /// absent: -20,0,20,40,60
+    #[arg(long, value_name = "C", value_delimiter = ',', allow_hyphen_values = true)]
+    temperatures: Option<Vec<f64>>,
 
     /// The linear expansion of the mount for `thermal`, in 1e-6/K; absent: that of the lens, 23.6 (aluminium)
     /// unless it says another
@@ -213,11 +219,25 @@ enum AnalysisKind {
     Thermal,
 }
 
+/// The spatial frequencies in cycles/mm, the surface, the number of ghosts, the temperatures in degrees C and the
+/// tolerance that are not asked for otherwise.
+const FREQUENCIES: [f64; 5] = [10.0, 20.0, 30.0, 40.0, 50.0];
+const SURFACE: usize = 1;
+const GHOSTS: usize = 45;
+const TEMPERATURES_C: [f64; 5] = [-20.0, 0.0, 20.0, 40.0, 60.0];
+const TOLERANCE: f64 = 1e-3;
+
 /// The rule for results at one wavelength.
 const ONE_WAVELENGTH: EffectRule = EffectRule {
     effect: Effect::Dispersion,
     allowed: AllowedSetting::AlwaysOff,
     reason: "only the primary wavelength is traced",
+};
+/// The rule for results at a wavelength that is chosen.
+const CHOSEN_WAVELENGTH: EffectRule = EffectRule {
+    effect: Effect::Dispersion,
+    allowed: AllowedSetting::AlwaysOn,
+    reason: "--wavelength chooses the light",
 };
 /// The rule for results that compare colours.
 const COLORS: EffectRule = EffectRule {
@@ -270,8 +290,10 @@ const TEMPERATURES: EffectRule = EffectRule {
 
 impl AnalysisKind {
     /// The effects that the analysis does not leave to the plan.
-    fn effect_rules(self) -> &'static [EffectRule] {
+    fn effect_rules(self, light: AskedLight) -> &'static [EffectRule] {
         match self {
+            Self::Psf | Self::EncircledEnergy if light == AskedLight::All => &[],
+            _ if matches!(light, AskedLight::Um(_)) => &[CHOSEN_WAVELENGTH],
             Self::Spot
             | Self::Fan
             | Self::ThroughFocus
@@ -316,6 +338,7 @@ impl AnalysisKind {
 
 impl AnalyzeArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        self.check_options()?;
         let mut paths = OutputPaths::reading([("the lens", self.lens.path())]);
         paths.file("--csv", self.csv.as_deref(), &["csv"])?;
         paths.file("--plot", self.plot.as_deref(), &charts::EXTENSIONS)?;
@@ -329,17 +352,11 @@ impl AnalyzeArgs {
             AnalysisKind::LateralColor => self.finish(&run, color::lateral_colors(&run), output),
             AnalysisKind::Longitudinal => self.finish(&run, color::longitudinal(&run), output),
             AnalysisKind::Footprint => {
-                self.finish(&run, color::footprints(&run, self.surface)?, output)
+                let surface = self.surface.unwrap_or(SURFACE);
+                self.finish(&run, color::footprints(&run, surface)?, output)
             }
             AnalysisKind::FieldCurvature => self.finish(&run, chief::curvatures(&run), output),
-            AnalysisKind::Illumination => {
-                let wave = self.wave.map(|wave| illumination::wave_scene(wave, self.distance));
-                let is_far = self.distance.is_none_or(|distance| distance > 0.0);
-                let option = if is_far { "--wave" } else { "--distance" };
-                let scene =
-                    wave.transpose().map_err(|why| CliError::Input(format!("{option}: {why}")))?;
-                self.finish(&run, illumination::illuminations(&run, scene.as_ref()), output)
-            }
+            AnalysisKind::Illumination => self.finish(&run, self.illuminations(&run)?, output),
             AnalysisKind::ThroughFocus => self.finish(&run, focus::through_focus(&run)?, output),
             AnalysisKind::Wavefront => {
                 self.finish(&run, wavefront::wavefronts(&run, &self.pupil_points), output)
@@ -348,8 +365,8 @@ impl AnalyzeArgs {
             AnalysisKind::Zernike => self.finish(&run, wavefront::zernikes(&run), output),
             AnalysisKind::Psf => self.finish(&run, point_spread::point_spreads(&run), output),
             AnalysisKind::EncircledEnergy => {
-                point_spread::check_radii(&run, &self.radii)?;
-                self.finish(&run, point_spread::encircled(&run, &self.radii), output)
+                encircled::check_radii(&run, &self.radii)?;
+                self.finish(&run, encircled::encircled(&run, &self.radii), output)
             }
             AnalysisKind::Mtf => self.finish(&run, contrast::contrasts(&run), output),
             AnalysisKind::ThroughFocusMtf => {
@@ -364,14 +381,28 @@ impl AnalyzeArgs {
             }
             AnalysisKind::Seidel => self.finish(&run, seidel::sums(&run)?, output),
             AnalysisKind::Ghosts => {
-                let lists = ghosts::ghost_lists(&run, self.coating, self.ghosts)?;
+                let (coating, count) = (self.coating.unwrap_or_default(), self.ghosts);
+                let lists = ghosts::ghost_lists(&run, coating, count.unwrap_or(GHOSTS))?;
                 self.finish(&run, lists, output)
             }
             AnalysisKind::Thermal => {
-                let found = thermal::temperatures(&run, &self.temperatures, self.mount)?;
+                let celsius = self.temperatures.as_deref().unwrap_or(&TEMPERATURES_C);
+                let found = thermal::temperatures(&run, celsius, self.mount)?;
                 self.finish(&run, found, output)
             }
         }
+    }
+
+    /// The light at all fields, of the scene that is asked for.
+    fn illuminations(
+        &self,
+        run: &AnalysisRun,
+    ) -> Result<Vec<AtField<illumination::IlluminationJson>>, CliError> {
+        let wave = self.wave.map(|wave| illumination::wave_scene(wave, self.distance));
+        let is_far = self.distance.is_none_or(|distance| distance > 0.0);
+        let option = if is_far { "--wave" } else { "--distance" };
+        let scene = wave.transpose().map_err(|why| CliError::Input(format!("{option}: {why}")))?;
+        Ok(illumination::illuminations(run, scene.as_ref()))
     }
 
     /// Prints the report of all fields, and writes it as CSV if that is asked for; it is printed too
@@ -399,7 +430,7 @@ impl AnalyzeArgs {
     /// Refuses radii that are no positive numbers, frequencies below zero, more frequencies than are
     /// computed in a short time, and no ghost.
     fn check_numbers(&self) -> Result<(), CliError> {
-        if self.ghosts == 0 {
+        if self.ghosts == Some(0) {
             return Err(CliError::Input("--ghosts: found 0; expected 1 or more".to_owned()));
         }
         if let Some(wrong) = self.reach.filter(|um| !(*um > 0.0 && *um <= 1e6)) {
@@ -411,13 +442,14 @@ impl AnalyzeArgs {
                 "--radii: found {wrong}; expected mm, above zero"
             )));
         }
-        let count = self.frequencies.len();
+        let frequencies = self.frequencies.as_deref().unwrap_or_default();
+        let count = frequencies.len();
         if count > MOST_FREQUENCIES {
             return Err(CliError::Input(format!(
                 "--frequencies: found {count} of them; expected at most {MOST_FREQUENCIES}"
             )));
         }
-        match self.frequencies.iter().find(|nu| !(nu.is_finite() && **nu >= 0.0)) {
+        match frequencies.iter().find(|nu| !(nu.is_finite() && **nu >= 0.0)) {
             Some(wrong) => Err(CliError::Input(format!(
                 "--frequencies: found {wrong}; expected cycles/mm, zero or more"
             ))),
@@ -441,6 +473,8 @@ struct AnalysisRun {
     fields: Vec<SelectedField>,
     zoom: usize,
     accuracy: Accuracy,
+    /// The light of an image or of a wavefront.
+    image_light: ImageLight,
     /// The spatial frequencies, in cycles/mm; at least one.
     frequencies: Vec<f64>,
     /// The points of a diffraction image, in mm from the image point of the chief ray.
@@ -463,9 +497,11 @@ struct SelectedField {
 impl AnalysisRun {
     fn new(analyze: &AnalyzeArgs) -> Result<Self, CliError> {
         analyze.check_numbers()?;
-        let choices = analyze.effects.choices(analyze.what.effect_rules())?;
-        let opened = analyze.lens.open()?;
         let AnalyzeArgs { what, zoom, .. } = *analyze;
+        let asked = what.light(analyze.wavelength)?;
+        let choices = analyze.effects.choices(what.effect_rules(asked))?;
+        let opened = analyze.lens.open()?;
+        let light_um = asked.um(&opened)?;
         opened.check_zoom(zoom)?;
         let listed = &opened.lens.fields_at(zoom).values;
         let chosen = analyze.field.map(|y| opened.field_at(y, zoom)).transpose()?;
@@ -474,7 +510,8 @@ impl AnalysisRun {
         let blamed = opened.blame_field(analyze.field, zoom);
         let refuse = |source| CliError::RayModel { file: opened.file.clone(), source };
         let measured = effects::measure_effects_at(&opened.lens, zoom, &all).map_err(refuse)?;
-        let plan = choices.plan(&measured, what.purpose(analyze.error.0));
+        let tolerance = analyze.error.map_or(TOLERANCE, |error| error.0);
+        let plan = choices.plan(&measured, what.purpose(tolerance));
         let model = effects::build_ray_model_at(&opened.lens, zoom, &all, &plan).map_err(refuse)?;
         let pairs = all.iter().zip(&model.fields);
         let pairs = pairs.map(|(given, traced)| SelectedField { given: *given, traced: *traced });
@@ -482,8 +519,10 @@ impl AnalysisRun {
         let mut fields: Vec<SelectedField> = pairs.filter(is_selected).collect();
         // Of two equal fields one is enough.
         fields.truncate(chosen.map_or(fields.len(), |_| 1));
-        let accuracy = Accuracy { tolerance: analyze.error.0, ..Accuracy::default() };
-        let (frequencies, points) = (analyze.frequencies.clone(), analyze.points.clone());
+        let accuracy = Accuracy { tolerance, ..Accuracy::default() };
+        let frequencies = analyze.frequencies.clone().unwrap_or_else(|| FREQUENCIES.to_vec());
+        let points = analyze.points.clone();
+        let image_light = light::image_light(&model, light_um);
         let is_drawn = analyze.plot.is_some();
         Ok(Self {
             what,
@@ -494,11 +533,34 @@ impl AnalysisRun {
             fields,
             zoom,
             accuracy,
+            image_light,
             frequencies,
             points,
             is_drawn,
             reach: analyze.reach.map(|um| 1e-3 * um),
         })
+    }
+
+    /// The wavelength of a wavefront; the primary one for an image in all light.
+    fn wavelength(&self) -> usize {
+        match self.image_light {
+            ImageLight::Wavelength(index) => index,
+            ImageLight::All => self.model.primary,
+        }
+    }
+
+    /// That wavelength in um.
+    fn light_um(&self) -> f64 {
+        self.model.channels[self.wavelength()].um
+    }
+
+    /// The wavelengths of an image that carry light.
+    fn colors(&self) -> Vec<usize> {
+        let is_lit = |index: &usize| self.model.channels[*index].weight > 0.0;
+        match self.image_light {
+            ImageLight::Wavelength(index) => vec![index],
+            ImageLight::All => (0..self.model.channels.len()).filter(is_lit).collect(),
+        }
     }
 
     fn primary_um(&self) -> f64 {
@@ -526,11 +588,16 @@ impl AnalysisRun {
             return Err(self.refuse(reason));
         }
         let first = &self.model.first_order;
-        let um = self.primary_um();
+        let um = self.light_um();
+        let colors = self.colors().into_iter().map(|index| self.model.channels[index].um);
+        let light_um = if self.what.has_light() { colors.collect() } else { Vec::new() };
         Ok(AnalysisReport {
             analysis: self.what,
             zoom: self.zoom,
             wavelength_um: um,
+            has_more_light: self.what.sums_wavelengths()
+                && light_um.len() < self.opened.lens.wavelengths.len(),
+            light_um,
             tolerance: self.accuracy.tolerance,
             field_kind: self.opened.lens.fields_at(self.zoom).kind,
             airy_radius: first.working_f_number.map(|f| 1.22 * um * 1e-3 * f),
@@ -589,6 +656,12 @@ struct AnalysisReport<T> {
     analysis: AnalysisKind,
     zoom: usize,
     wavelength_um: f64,
+    /// The wavelengths of an image or of a wavefront.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    light_um: Vec<f64>,
+    /// True if the result could be that of more wavelengths.
+    #[serde(skip)]
+    has_more_light: bool,
     tolerance: f64,
     field_kind: FieldKind,
     airy_radius: Option<f64>,
@@ -656,6 +729,9 @@ impl<T: TextLines> Display for AnalysisReport<T> {
             FieldKind::ImageHeight => "mm at the image",
         };
         writeln!(f, "{}", T::TITLE)?;
+        if let Some(light) = light::light_text(&self.light_um, self.has_more_light) {
+            writeln!(f, "{light}")?;
+        }
         for field in &self.fields {
             let AtField { x, y, outcome } = field;
             let across = if *x == 0.0 { String::new() } else { format!("x {}, ", ShortNumber(*x)) };
@@ -682,6 +758,13 @@ fn estimate_text(name: &str, estimate: &Estimate) -> String {
 /// The cause of errors above the tolerance, as it follows the cost of numbers; empty if it was reached.
 fn not_reached_text(limit: Option<ContrastLimit>) -> String {
     limit.map_or_else(String::new, |limit| format!(", tolerance not reached: {limit}"))
+}
+
+/// The wavelengths that a sum over all of them leaves out, since they have no light.
+fn dark_text(dark_share: f64) -> Option<String> {
+    (dark_share > 0.0).then(|| {
+        format!("{:.1} % of the weight is of wavelengths without light", 100.0 * dark_share)
+    })
 }
 
 /// Computes a result and passes it with its milliseconds to `note`.

@@ -1,11 +1,12 @@
-//! The diffraction image of a point: intensities, Strehl ratios and encircled energy.
+//! The diffraction image of a point: intensities and Strehl ratios.
 
-use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text, not_reached_text};
-use crate::analysis::{
-    ContrastLimit, Estimate, PointSpread, ReferenceForm, Strehl, encircled_energy, point_spread,
-    strehl,
+use super::{
+    AnalysisRun, AtField, SelectedField, TextLines, dark_text, estimate_text, not_reached_text,
 };
-use crate::cli::error::CliError;
+use crate::analysis::{
+    ContrastLimit, Estimate, ImageLight, PointSpread, ReferenceForm, Strehl, point_spread_unless,
+    strehl_unless,
+};
 use crate::cli::output::{ShortNumber, counted, without_rounding};
 use crate::measure::time_ms;
 use crate::plot::{ChartCurve, CurveChart};
@@ -24,7 +25,12 @@ pub(super) struct PointSpreadJson {
     reached: bool,
     /// The cause of errors above the tolerance; `None` if it was reached.
     limit: Option<ContrastLimit>,
+    /// The share of the weight of wavelengths without light.
+    dark_share: f64,
     points: Vec<IntensityJson>,
+    /// True if the light is that of all wavelengths.
+    #[serde(skip)]
+    in_all_light: bool,
     /// The rounding error of a length, in mm.
     #[serde(skip)]
     rounding: f64,
@@ -47,8 +53,8 @@ const MOST_RAYS: usize = 1_000_000;
 const PROFILE: i32 = 10;
 
 /// The size of the diffraction image, λF in mm.
-fn unit(run: &AnalysisRun) -> f64 {
-    run.primary_um() * 1e-3 * run.model.first_order.working_f_number.unwrap_or(1.0).abs()
+pub(super) fn unit(run: &AnalysisRun) -> f64 {
+    run.light_um() * 1e-3 * run.model.first_order.working_f_number.unwrap_or(1.0).abs()
 }
 
 pub(super) fn point_spreads(run: &AnalysisRun) -> Vec<AtField<PointSpreadJson>> {
@@ -63,13 +69,16 @@ pub(super) fn point_spreads(run: &AnalysisRun) -> Vec<AtField<PointSpreadJson>> 
     let points: Vec<[f64; 2]> =
         if run.points.is_empty() { along(0).chain(along(1)).collect() } else { run.points.clone() };
     let at = |field: &SelectedField| {
-        let (model, w) = (&run.model, run.model.primary);
+        let (model, light) = (&run.model, run.image_light);
         let (found, ms) = time_ms(|| {
             let accuracy = Accuracy { max_rays: MOST_RAYS, ..run.accuracy };
-            let spread = point_spread(model, field.traced, w, &points, accuracy)?;
-            Ok((spread, strehl(model, field.traced, w, run.accuracy)?))
+            let image = (light, points.as_slice());
+            let spread = point_spread_unless(model, field.traced, image, accuracy, &|| false)?;
+            let strehl = strehl_unless(model, field.traced, light, run.accuracy, &|| false)?;
+            Ok((spread, strehl))
         });
         let keys = found.map(|(spread, strehl)| PointSpreadJson {
+            in_all_light: light == ImageLight::All,
             rounding: run.rounding(),
             profiles: if run.is_drawn { profiles(run, field) } else { Profiles::default() },
             ..keys(&spread, strehl, &points, ms)
@@ -100,30 +109,33 @@ const SPREAD_SIDE: usize = 32;
 /// The rays of the drawn profiles.
 const DRAWN_RAYS: usize = 100_000;
 
-/// The radius in mm of the circle about the image point of the chief ray that holds 99 % of the rays; `None`
-/// without light.
-fn circle_of_rays(run: &AnalysisRun, field: &SelectedField) -> Option<f64> {
-    let (model, primary) = (&run.model, run.model.primary);
-    let launch = model.launch(field.traced, primary).ok()?;
-    let landing = |point: [f64; 2]| {
-        let traced = model.channels[primary].tracer.trace(launch.ray(point)?);
-        traced.fate.is_imaged().then_some(traced.ray.point)
+/// The radius in mm of the circle about the image point of the chief ray that holds a share of the rays of all
+/// wavelengths of the image; `None` without light.
+pub(super) fn circle_of_rays(run: &AnalysisRun, field: &SelectedField, share: f64) -> Option<f64> {
+    let (model, colors) = (&run.model, run.colors());
+    let landings = |wavelength: usize, points: &[[f64; 2]]| -> Vec<[f64; 2]> {
+        let Ok(launch) = model.launch(field.traced, wavelength) else { return Vec::new() };
+        let landing = |point: &[f64; 2]| {
+            let traced = model.channels[wavelength].tracer.trace(launch.ray(*point)?);
+            traced.fate.is_imaged().then_some([traced.ray.point.x, traced.ray.point.y])
+        };
+        points.iter().filter_map(landing).collect()
     };
-    let chief = landing([0.0; 2])?;
+    let first = if colors.contains(&model.primary) { model.primary } else { *colors.first()? };
+    let chief = *landings(first, &[[0.0; 2]]).first()?;
     let grid = pattern_points(PupilPattern::Square(SPREAD_SIDE));
-    let landed = grid.into_iter().filter_map(landing);
-    let mut distances: Vec<f64> =
-        landed.map(|point| (point.x - chief.x).hypot(point.y - chief.y)).collect();
+    let landed = colors.iter().flat_map(|wavelength| landings(*wavelength, &grid));
+    let mut distances: Vec<f64> = landed.map(|[x, y]| (x - chief[0]).hypot(y - chief[1])).collect();
     distances.sort_by(f64::total_cmp);
-    let inside = (DRAWN_SHARE * distances.len() as f64).ceil() as usize;
+    let inside = (share * distances.len() as f64).ceil() as usize;
     distances.get(inside.saturating_sub(1)).copied().filter(|radius| radius.is_finite())
 }
 
 /// The profiles of a field; none where its image is not known.
 fn profiles(run: &AnalysisRun, field: &SelectedField) -> Profiles {
-    let reach = run
-        .reach
-        .unwrap_or_else(|| circle_of_rays(run, field).unwrap_or(0.0).max(LEAST_REACH * unit(run)));
+    let reach = run.reach.unwrap_or_else(|| {
+        circle_of_rays(run, field, DRAWN_SHARE).unwrap_or(0.0).max(LEAST_REACH * unit(run))
+    });
     let [least, most] = DRAWN_POINTS;
     let count = (DRAWN * reach / unit(run)).ceil().clamp(least, most) as i32;
     let place = |i: i32| f64::from(i) / f64::from(count) * reach;
@@ -131,7 +143,8 @@ fn profiles(run: &AnalysisRun, field: &SelectedField) -> Profiles {
     let along_y = (-count..=count).map(|i| [0.0, place(i)]);
     let points: Vec<[f64; 2]> = along_x.chain(along_y).collect();
     let accuracy = Accuracy { max_rays: DRAWN_RAYS, ..run.accuracy };
-    let found = point_spread(&run.model, field.traced, run.model.primary, &points, accuracy);
+    let image = (run.image_light, points.as_slice());
+    let found = point_spread_unless(&run.model, field.traced, image, accuracy, &|| false);
     let Ok(found) = found else { return Profiles::default() };
     let drawn = points.iter().zip(&found.intensities);
     let drawn: Vec<_> = drawn.map(|(at, e)| [1e3 * (at[0] + at[1]), e.value]).collect();
@@ -154,6 +167,8 @@ fn keys(spread: &PointSpread, strehl: Strehl, points: &[[f64; 2]], ms: f64) -> P
         reference: spread.reference,
         reached: spread.reached && strehl.reached,
         limit: limit_of(spread, strehl),
+        dark_share: spread.dark_share,
+        in_all_light: false,
         points: points.iter().zip(&spread.intensities).map(point).collect(),
         rounding: 0.0,
         profiles: Profiles::default(),
@@ -182,8 +197,8 @@ impl PointSpreadJson {
 }
 
 impl TextLines for PointSpreadJson {
-    const TITLE: &'static str = "diffraction image of a point at the primary wavelength, relative to \
-         the peak without aberrations; x and y in mm from the image point of the chief ray";
+    const TITLE: &'static str = "diffraction image of a point, relative to the peak without aberrations; x and y \
+         in mm from the image point of the chief ray";
 
     fn error_unit(_key: &str) -> &'static str {
         ""
@@ -196,9 +211,12 @@ impl TextLines for PointSpreadJson {
             estimate_text("best Strehl", &self.best_strehl),
             format!("found at x {x}, y {y}, along the axis {z} mm"),
         ];
-        if !self.best_is_global {
+        if self.in_all_light {
+            lines.push("the brightest point near those of the single wavelengths".to_owned());
+        } else if !self.best_is_global {
             lines.push("a local maximum: the blur is too large to be searched".to_owned());
         }
+        lines.extend(dark_text(self.dark_share));
         lines.push(self.points_head());
         lines.push(format!("{:>12}  {:>12}  intensity", "x, mm", "y, mm"));
         lines.extend(self.points.iter().map(|point| {
@@ -233,93 +251,6 @@ impl TextLines for PointSpreadJson {
 /// Intensities below this are not drawn on a logarithmic scale.
 const DARK: f64 = 1e-6;
 
-/// The encircled energy of a field.
-#[derive(Serialize)]
-pub(super) struct EncircledJson {
-    reached: bool,
-    /// The cause of errors above the tolerance; `None` if it was reached.
-    limit: Option<ContrastLimit>,
-    circles: Vec<CircleJson>,
-}
-
-#[derive(Serialize)]
-struct CircleJson {
-    radius: f64,
-    energy: Estimate,
-}
-
-/// The radii of the circles, in λF.
-const RADII: [f64; 10] = [0.25, 0.5, 0.75, 1.0, 1.22, 1.5, 2.0, 3.0, 4.0, 6.0];
-
-/// The largest radius of a circle in λF: beyond, no affordable nodes resolve the fringes.
-const LARGEST_RADIUS: f64 = 200.0;
-
-/// Refuses circles that are too large.
-pub(super) fn check_radii(run: &AnalysisRun, asked: &[f64]) -> Result<(), CliError> {
-    let most = LARGEST_RADIUS * unit(run);
-    match asked.iter().find(|radius| **radius > most) {
-        Some(found) => {
-            let most = ShortNumber(most);
-            let text = format!(
-                "--radii: found {found}; expected mm, at most {most}, {LARGEST_RADIUS} lambda F"
-            );
-            Err(CliError::Input(text))
-        }
-        None => Ok(()),
-    }
-}
-
-pub(super) fn encircled(run: &AnalysisRun, asked: &[f64]) -> Vec<AtField<EncircledJson>> {
-    let usual = || RADII.iter().map(|r| r * unit(run)).collect();
-    let radii: Vec<f64> = if asked.is_empty() { usual() } else { asked.to_vec() };
-    let at = |field: &SelectedField| {
-        let (found, ms) = time_ms(|| {
-            let (model, w) = (&run.model, run.model.primary);
-            encircled_energy(model, field.traced, w, [0.0; 2], &radii, run.accuracy)
-        });
-        let circle = |(radius, energy): (&f64, Estimate)| CircleJson {
-            radius: *radius,
-            energy: Estimate { milliseconds: Some(ms), ..energy },
-        };
-        let keys = found.map(|list| {
-            let largest = list.iter().map(|energy| energy.error).fold(0.0, f64::max);
-            let reached = largest <= run.accuracy.tolerance;
-            EncircledJson {
-                reached,
-                limit: (!reached).then_some(ContrastLimit::Nodes(largest)),
-                circles: radii.iter().zip(list).map(circle).collect(),
-            }
-        });
-        AtField::new(field, keys)
-    };
-    run.fields.iter().map(at).collect()
-}
-
-impl TextLines for EncircledJson {
-    const TITLE: &'static str = "encircled energy by diffraction at the primary wavelength: share of \
-         the light within circles about the image point of the chief ray, radii in mm";
-
-    fn error_unit(_key: &str) -> &'static str {
-        ""
-    }
-
-    fn lines(&self) -> Vec<String> {
-        let line = |circle: &CircleJson| {
-            estimate_text(&ShortNumber(circle.radius).to_string(), &circle.energy)
-        };
-        let head = format!("{:<22} {:>13}{}", "radius, mm", "share", not_reached_text(self.limit));
-        std::iter::once(head).chain(self.circles.iter().map(line)).collect()
-    }
-
-    fn charts(&self) -> Vec<CurveChart> {
-        let circles = self.circles.iter().map(|circle| (circle.radius, Some(circle.energy.value)));
-        let points = std::iter::once((0.0, Some(0.0))).chain(circles);
-        let curve = ChartCurve::new("diffraction", 0, points);
-        let axes = ["radius, mm", "share of the light"];
-        vec![CurveChart::new("encircled energy", axes, vec![curve])]
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -332,6 +263,7 @@ mod tests {
             center: [0.0; 2],
             reached,
             reference: ReferenceForm::Plane,
+            dark_share: 0.0,
         };
         let strehl = Strehl {
             at_chief: spread.strehl,

@@ -1,5 +1,6 @@
 //! The image of a point by rays alone: its density, and the light within circles.
 
+use super::encircled::{SHARES, ShareRadii};
 use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text};
 use crate::analysis::{
     AnalysisError, Estimate, RayImage, RayImageRequest, grid_sides, ray_image, spot,
@@ -42,7 +43,7 @@ fn image(
     half_width: f64,
     radii: &[f64],
 ) -> Result<RayImage, AnalysisError> {
-    let request = RayImageRequest { count: COLUMNS, half_width, radii };
+    let request = RayImageRequest { count: COLUMNS, half_width, radii, shares: &SHARES };
     ray_image(&run.model, field.traced, request, run.accuracy, &|| false)
 }
 
@@ -131,17 +132,23 @@ impl TextLines for RayImageJson {
 pub(super) struct RayEnergyJson {
     center: [f64; 2],
     reached: bool,
+    #[serde(flatten)]
+    shares: ShareRadii,
     circles: Vec<RayCircleJson>,
+    /// The circles of the drawn curve.
+    #[serde(skip)]
+    curve: Vec<RayCircleJson>,
 }
 
-#[derive(Serialize)]
+#[derive(Clone, Copy, Serialize)]
 struct RayCircleJson {
     radius: f64,
     energy: Estimate,
 }
 
-/// The number of circles if none are asked for.
+/// The number of circles if none are asked for, and those between them of a drawn curve.
 const CIRCLES: usize = 10;
+const DRAWN: usize = 6;
 
 pub(super) fn energies(run: &AnalysisRun, asked: &[f64]) -> Vec<AtField<RayEnergyJson>> {
     let at = |field: &SelectedField| {
@@ -149,20 +156,28 @@ pub(super) fn energies(run: &AnalysisRun, asked: &[f64]) -> Vec<AtField<RayEnerg
             let half_width = half_width(run, field)?;
             let part = |k: usize| half_width / MARGIN * (k + 1) as f64 / CIRCLES as f64;
             let usual: Vec<f64> = (0..CIRCLES).map(part).collect();
-            let radii = if asked.is_empty() { usual } else { asked.to_vec() };
-            image(run, field, half_width, &radii).map(|image| (image, radii))
+            let listed = if asked.is_empty() { usual } else { asked.to_vec() };
+            let reach = listed.iter().copied().fold(0.0, f64::max);
+            let count = if run.is_drawn { CIRCLES * DRAWN } else { 0 };
+            let drawn = (0..count).map(|k| reach * (k + 1) as f64 / count as f64);
+            let radii: Vec<f64> = listed.iter().copied().chain(drawn).collect();
+            image(run, field, half_width, &radii).map(|image| (image, radii, listed.len()))
         });
-        let keys = found.map(|(image, radii)| RayEnergyJson {
-            center: image.center,
-            reached: image.reached,
-            circles: radii
-                .into_iter()
-                .zip(image.energy)
-                .map(|(radius, energy)| RayCircleJson {
-                    radius,
-                    energy: Estimate { milliseconds: Some(ms), ..energy },
-                })
-                .collect(),
+        let keys = found.map(|(image, radii, listed)| {
+            let circle = |(radius, energy): (f64, Estimate)| RayCircleJson {
+                radius,
+                energy: Estimate { milliseconds: Some(ms), ..energy },
+            };
+            let shares: Vec<_> = image.share_radii.iter().copied().map(Some).collect();
+            let mut circles: Vec<_> = radii.into_iter().zip(image.energy).map(circle).collect();
+            let curve = circles.split_off(listed);
+            RayEnergyJson {
+                center: image.center,
+                reached: image.reached,
+                shares: ShareRadii::new(&shares, ms),
+                circles,
+                curve,
+            }
         });
         AtField::new(field, keys)
     };
@@ -173,8 +188,8 @@ impl TextLines for RayEnergyJson {
     const TITLE: &'static str = "encircled energy by rays, all wavelengths: share of the light within circles about \
          the image point of the chief ray, radii in mm";
 
-    fn error_unit(_key: &str) -> &'static str {
-        ""
+    fn error_unit(key: &str) -> &'static str {
+        if key.starts_with("radius") { " mm" } else { "" }
     }
 
     fn lines(&self) -> Vec<String> {
@@ -183,13 +198,18 @@ impl TextLines for RayEnergyJson {
         };
         let head = format!("{:<22} {:>13}", "radius, mm", "share");
         let left = (!self.reached).then(|| "the tolerance was not reached".to_owned());
-        std::iter::once(head).chain(self.circles.iter().map(line)).chain(left).collect()
+        let mut lines = self.shares.lines();
+        lines.push(head);
+        lines.extend(self.circles.iter().map(line).chain(left));
+        lines
     }
 
     fn charts(&self) -> Vec<CurveChart> {
-        let circles = self.circles.iter().map(|circle| (circle.radius, Some(circle.energy.value)));
+        let circles = self.curve.iter().map(|circle| (circle.radius, Some(circle.energy.value)));
         let points = std::iter::once((0.0, Some(0.0))).chain(circles);
         let axes = ["radius, mm", "share of the light"];
-        vec![CurveChart::new("encircled energy", axes, vec![ChartCurve::new("rays", 0, points)])]
+        let mut curves = vec![ChartCurve::new("rays", 0, points)];
+        curves.extend(self.shares.marks(1));
+        vec![CurveChart::new("encircled energy", axes, curves)]
     }
 }

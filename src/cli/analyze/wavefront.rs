@@ -68,8 +68,8 @@ fn map_points() -> Vec<[f64; 2]> {
 pub(super) fn wavefronts(run: &AnalysisRun, asked: &[[f64; 2]]) -> Vec<AtField<WavefrontJson>> {
     let points = if asked.is_empty() { map_points() } else { asked.to_vec() };
     let at = |field: &SelectedField| {
-        let primary = run.model.primary;
-        let (found, ms) = time_ms(|| wavefront(&run.model, field.traced, primary, run.accuracy));
+        let light = run.wavelength();
+        let (found, ms) = time_ms(|| wavefront(&run.model, field.traced, light, run.accuracy));
         let keys = found.and_then(|found| {
             let timed = |e| Estimate { milliseconds: Some(ms), ..e };
             let (chief, map) = paths(run, field, &points)?;
@@ -96,7 +96,7 @@ const MAP: usize = 81;
 
 /// The path differences over the pupil, to be drawn.
 fn path_grid(run: &AnalysisRun, field: &SelectedField) -> Result<ContourGrid, AnalysisError> {
-    let map = path_map(&run.model, field.traced, run.model.primary, MAP)?;
+    let map = path_map(&run.model, field.traced, run.wavelength(), MAP)?;
     let side = grid_sides(map.count, map.half_width);
     Ok(ContourGrid { places: [side.clone(), side], values: map.values })
 }
@@ -107,7 +107,7 @@ fn paths(
     field: &SelectedField,
     points: &[[f64; 2]],
 ) -> Result<(ChiefJson, Vec<PathJson>), AnalysisError> {
-    let (chief, found) = field_paths(&run.model, field.traced, run.model.primary, points)?;
+    let (chief, found) = field_paths(&run.model, field.traced, run.wavelength(), points)?;
     let keys = |(p, found): (&[f64; 2], Result<PathDifference, PathError>)| PathJson {
         px: p[0],
         py: p[1],
@@ -120,8 +120,7 @@ fn paths(
 }
 
 impl TextLines for WavefrontJson {
-    const TITLE: &'static str =
-        "wavefront at the primary wavelength, in wavelengths; --json lists the map";
+    const TITLE: &'static str = "wavefront, in wavelengths; --json lists the map";
 
     fn error_unit(_key: &str) -> &'static str {
         " waves"
@@ -187,7 +186,7 @@ pub(super) fn path_fans(run: &AnalysisRun) -> Vec<AtField<PathFanJson>> {
             if dark { Err(AnalysisError::NoLight) } else { Ok((tangential, sagittal)) }
         });
         let keys = lit.map(|(tangential, sagittal)| PathFanJson {
-            error: run.rounding() / (run.primary_um() * 1e-3),
+            error: run.rounding() / (run.light_um() * 1e-3),
             rays: tangential.len() + sagittal.len(),
             milliseconds,
             tangential,
@@ -199,8 +198,7 @@ pub(super) fn path_fans(run: &AnalysisRun) -> Vec<AtField<PathFanJson>> {
 }
 
 impl TextLines for PathFanJson {
-    const TITLE: &'static str =
-        "fans of path differences at the primary wavelength, in wavelengths";
+    const TITLE: &'static str = "fans of path differences, in wavelengths";
 
     fn error_unit(_key: &str) -> &'static str {
         " waves"
@@ -248,7 +246,7 @@ const TERMS: usize = 37;
 pub(super) fn zernikes(run: &AnalysisRun) -> Vec<AtField<ZernikeJson>> {
     let at = |field: &SelectedField| {
         let sum = |order| {
-            zernike(&run.model, field.traced, run.model.primary, (order, TERMS), run.accuracy)
+            zernike(&run.model, field.traced, run.wavelength(), (order, TERMS), run.accuracy)
         };
         let (found, ms) = time_ms(|| Ok((sum(ZernikeOrder::Noll)?, sum(ZernikeOrder::Fringe)?)));
         let timed = |e: Estimate| Estimate { milliseconds: Some(ms), ..e };
@@ -265,9 +263,8 @@ pub(super) fn zernikes(run: &AnalysisRun) -> Vec<AtField<ZernikeJson>> {
 }
 
 impl TextLines for ZernikeJson {
-    const TITLE: &'static str = "Zernike coefficients of the wavefront at the primary wavelength over \
-         the unit disc of the pupil, in wavelengths: Noll's order (RMS 1) and the fringe order (1 at \
-         the rim)";
+    const TITLE: &'static str = "Zernike coefficients of the wavefront over the unit disc of the pupil, in \
+         wavelengths: Noll's order (RMS 1) and the fringe order (1 at the rim)";
 
     fn error_unit(_key: &str) -> &'static str {
         " waves"

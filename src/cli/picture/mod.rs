@@ -25,7 +25,7 @@ use crate::picture::{
 };
 use crate::pupil::RayModel;
 use render::RenderedPicture;
-use report::{ErrorMapReport, PictureReport};
+use report::{ErrorMapReport, PictureReport, not_reached};
 use sensor::SensorArgs;
 use serde::Serialize;
 use std::env;
@@ -258,6 +258,8 @@ impl PictureArgs {
             losses: rendered.losses.as_ref(),
             ghosts: found,
         };
+        let reached = picture.reached && split.error() <= self.error.0;
+        let reason = || not_reached(split.shares(), self.error.0, picture.complete);
         PictureReport {
             scene: self.scene.clone(),
             pixels: picture.frame.pixels,
@@ -271,7 +273,8 @@ impl PictureArgs {
             error_of_error: sampling.error,
             errors: split.shares().to_vec(),
             tolerance: self.error.0,
-            reached: picture.reached && split.error() <= self.error.0,
+            reached,
+            not_reached: (!reached).then(reason),
             complete: picture.complete,
             white: picture.white,
             mean: picture.mean(),

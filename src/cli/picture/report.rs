@@ -25,6 +25,8 @@ pub(super) struct PictureReport {
     pub(super) errors: Vec<ErrorShare>,
     pub(super) tolerance: f64,
     pub(super) reached: bool,
+    /// The reason why the tolerance was not reached.
+    pub(super) not_reached: Option<String>,
     pub(super) complete: bool,
     pub(super) white: f64,
     pub(super) mean: f64,
@@ -84,6 +86,21 @@ impl Display for SensorReport {
         )?;
         writeln!(f, "  {:.2} % saturated; {}", 100.0 * self.saturated, self.source)
     }
+}
+
+/// The reason why a picture with these errors does not keep its tolerance.
+pub(super) fn not_reached(errors: &[ErrorShare], tolerance: f64, is_complete: bool) -> String {
+    if !is_complete {
+        return "the work was ended early".to_owned();
+    }
+    let whole = errors.iter().map(|share| share.used.powi(2)).sum::<f64>().sqrt();
+    let largest = errors.iter().max_by(|a, b| a.used.total_cmp(&b.used));
+    let Some(ErrorShare { effect, used, .. }) = largest.filter(|_| whole > tolerance) else {
+        return "some parts met --max-samples before".to_owned();
+    };
+    let others = if *used > tolerance { " alone" } else { ", the largest part," };
+    let remedy = if *effect == "sampling" { "; a larger --max-samples makes it less" } else { "" };
+    format!("{effect}{others} takes {:.3} %{remedy}", 100.0 * used)
 }
 
 impl PictureReport {
@@ -158,7 +175,8 @@ impl Display for PictureReport {
             )?;
         }
         writeln!(f, "{columns} x {rows} pixels on {width:.3} x {height:.3} mm")?;
-        let reached = if self.reached { "" } else { ", not reached" };
+        let why = self.not_reached.as_ref();
+        let reached = why.map_or_else(String::new, |why| format!(", not reached: {why}"));
         let percent = 100.0 * self.tolerance;
         let tolerance = ShortNumber(percent);
         let error = 100.0 * self.error;
@@ -218,4 +236,23 @@ fn losses_text(losses: &LossReport) -> String {
         "losses on: {coating}, {passed:.1} % arrives on the axis, glass absorbs {absorbed:.2} \
          %{unknown}; it varies by {varied:.2} %: {how}"
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missed_tolerance_has_its_reason() {
+        let share = |effect, used| ErrorShare { effect, allowed: 0.007, used };
+        let reason = |used: [f64; 2], is_complete| {
+            not_reached(&[share("sampling", used[0]), share("ghosts", used[1])], 0.01, is_complete)
+        };
+        assert_eq!(reason([0.002, 0.03], true), "ghosts alone takes 3.000 %");
+        assert_eq!(reason([0.002, 0.03], false), "the work was ended early");
+        assert_eq!(reason([0.001, 0.002], true), "some parts met --max-samples before");
+        let sampling =
+            "sampling, the largest part, takes 0.900 %; a larger --max-samples makes it less";
+        assert_eq!(reason([0.009, 0.006], true), sampling);
+    }
 }

@@ -142,6 +142,13 @@ impl FurtherMerits {
                 ));
             }
         }
+        let expected = self.mtf.as_ref().and_then(|own| own.expected);
+        if expected.is_some_and(|expected| expected.iter().any(|contrast| *contrast < 0.0)) {
+            warnings.push(format!(
+                "MTF, expected: {BELOW_ZERO}, as no contrast is: the errors are too large for the derivatives that it \
+                 is expected by; the contrast of lenses by their rays counts"
+            ));
+        }
         if self.mtf.is_some() && !sheet.correlations.is_empty() {
             let text = "the expected contrast counts correlated errors as independent";
             warnings.push(text.to_owned());
@@ -231,7 +238,7 @@ impl Display for FurtherMerits {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut table = TextTable::new(&["", "fixed focus", "refocused"]);
         let mut row = |name: String, [fixed, refocused]: [f64; 2]| {
-            table.row([name, ShortNumber(fixed).to_string(), ShortNumber(refocused).to_string()]);
+            table.row([name, merit_text(fixed), merit_text(refocused)]);
         };
         if let Some(own) = &self.wavefront {
             row("RMS wavefront as designed, waves".to_owned(), own.nominal_rms);
@@ -253,6 +260,13 @@ impl Display for FurtherMerits {
         writeln!(f, "{table}")
     }
 }
+
+/// A merit as text. Below 0, which no merit is, the errors are too large for its derivatives.
+fn merit_text(merit: f64) -> String {
+    if merit < 0.0 { BELOW_ZERO.to_owned() } else { ShortNumber(merit).to_string() }
+}
+
+const BELOW_ZERO: &str = "below 0";
 
 /// The row of a merit of real lenses, with the larger of its two errors.
 fn real_row(row: &mut impl FnMut(String, [f64; 2]), name: &str, real: RealMerit) {

@@ -205,6 +205,9 @@ impl ToleranceArgs {
         };
         let request = ToleranceRequest { seed: self.seed, samples: self.samples, limit: self.rms };
         let model = ErrorModel::new(scene, sheet, second, stop).map_err(refuse)?;
+        // Before the random lenses, which take most of the time.
+        let reached = self.goal().map_or(Ok(()), |goal| goal.check(&model.forms[1]));
+        reached.map_err(|source| self.loosest_error(opened, &source))?;
         let mut failed = None;
         let save = |lenses: &[RealLens]| {
             let saved = self.checkpoint.as_deref().map(|path| source.save(path, lenses));
@@ -224,6 +227,15 @@ impl ToleranceArgs {
         paths.file("--plot", self.plot.as_deref(), &plots::EXTENSIONS)
     }
 
+    /// The aim of the loosest tolerances, if they are asked for.
+    fn goal(&self) -> Option<LoosestGoal> {
+        match (self.loosest, self.loosest_yield, self.rms) {
+            (Some(rms), ..) => Some(LoosestGoal::Rms(rms)),
+            (None, Some(share), Some(rms)) => Some(LoosestGoal::Yield { rms, share: share.0 }),
+            _ => None,
+        }
+    }
+
     /// The loosest tolerances, if they are asked for.
     fn loosest(
         &self,
@@ -231,11 +243,7 @@ impl ToleranceArgs {
         analysis: &ToleranceAnalysis,
         (sheet, stop): (&ToleranceSheet, StopTest<'_>),
     ) -> Result<Option<LoosestTolerances>, ToleranceError> {
-        let goal = match (self.loosest, self.loosest_yield, self.rms) {
-            (Some(rms), ..) => LoosestGoal::Rms(rms),
-            (None, Some(share), Some(rms)) => LoosestGoal::Yield { rms, share: share.0 },
-            _ => return Ok(None),
-        };
+        let Some(goal) = self.goal() else { return Ok(None) };
         let request = LoosestRequest { goal, limit: self.rms, seed: self.seed };
         let form = (&analysis.forms[1], analysis.pupils.moves);
         LoosestTolerances::new(lens, form, sheet, request, stop).map(Some)

@@ -32,12 +32,12 @@ pub use ray_images::{FieldRayImage, RayImages};
 pub use scene::{PictureScene, SceneFile};
 use scene_picture::PictureExtras;
 pub use scene_picture::ScenePicture;
-pub use wavefronts::{FieldWavefront, FieldWavefronts, PointImage, PointImages};
+pub use wavefronts::{ENERGY_SHARES, FieldWavefront, FieldWavefronts, PointImage, PointImages};
 
 use super::clock::{Timed, now, time};
 use super::run::{LatestRequestWorker, WorkerOutput, catch_panic};
 use crate::analysis::{
-    self, AnalysisError, Coating, Fan, FieldCurves, Footprint, GhostError, GridPoint,
+    self, AnalysisError, Coating, Fan, FieldCurves, Footprint, GhostError, GridPoint, ImageLight,
     LongitudinalAberration, PathFan, RayLayout, Spot, SpotMap, SpotPoints,
 };
 use crate::effects::{self, Effect, EffectOverride, EffectOverrides, EffectPlan, TracePurpose};
@@ -536,6 +536,10 @@ pub struct AnalysisSettings {
     /// True if the images of a point by rays are computed, because the panel shows them.
     #[serde(default)]
     pub ray_images: bool,
+    /// The light of the images of a point, and of the wavefronts where it is of one wavelength; `None` for the
+    /// primary one, in which wavefronts are computed too where images are in all light.
+    #[serde(default)]
+    pub wavefront_light: Option<ImageLight>,
     /// True if the ray fans are computed, because a panel shows them.
     #[serde(default)]
     pub fans: bool,
@@ -634,6 +638,7 @@ impl Default for AnalysisSettings {
             wavefronts: false,
             point_images: false,
             ray_images: false,
+            wavefront_light: None,
             fans: false,
             path_fans: false,
             field_curves: false,

@@ -1,6 +1,6 @@
 //! The images of a point by rays alone at all fields.
 
-use super::wavefronts::half_width;
+use super::wavefronts::{ENERGY_SHARES, half_width};
 use crate::analysis::{AnalysisError, RayImage, RayImageRequest, Spot, ray_image};
 use crate::lens::FieldPoint;
 use crate::pupil::{Accuracy, RayModel};
@@ -43,7 +43,12 @@ pub(super) fn ray_images(
             let half_width = half_width(model, spot).max(reach);
             let part = |k: usize| half_width * (k + 1) as f64 / CIRCLES as f64;
             let radii: Vec<f64> = (0..CIRCLES).map(part).collect();
-            let request = RayImageRequest { count: COLUMNS, half_width, radii: &radii };
+            let request = RayImageRequest {
+                count: COLUMNS,
+                half_width,
+                radii: &radii,
+                shares: &ENERGY_SHARES,
+            };
             let image = ray_image(model, *field, request, LOOKED_AT, interrupted)?;
             Ok(FieldRayImage { image, radii })
         })

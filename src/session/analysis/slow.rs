@@ -37,6 +37,7 @@ impl<T> KnownNumbers<T> {
             && own.overrides == other.overrides
             && own.coating == other.coating
             && own.contrast_frequency == other.contrast_frequency
+            && own.wavefront_light == other.wavefront_light
     }
 }
 

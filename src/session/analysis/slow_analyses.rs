@@ -160,8 +160,9 @@ fn wavefronts() -> SlowAnalysis<FieldWavefronts> {
     SlowAnalysis {
         is_asked: |settings| settings.wavefronts,
         compute: |results, analyses, interrupted| {
-            let model = &analyses.ray_model.value;
-            waves::field_wavefronts(model, results.settings.tolerance, interrupted)
+            let (model, settings) = (&analyses.ray_model.value, &results.settings);
+            let light = settings.wavefront_light;
+            waves::field_wavefronts(model, light, settings.tolerance, interrupted)
         },
         slot: |analyses| &mut analyses.wavefronts,
         known: None,
@@ -171,9 +172,10 @@ fn wavefronts() -> SlowAnalysis<FieldWavefronts> {
 fn point_images() -> SlowAnalysis<PointImages> {
     SlowAnalysis {
         is_asked: |settings| settings.wavefronts && settings.point_images,
-        compute: |_, analyses, interrupted| {
+        compute: |results, analyses, interrupted| {
             let (model, spots) = (&analyses.ray_model.value, &analyses.spots.value);
-            waves::point_images(model, spots, interrupted)
+            let light = results.settings.wavefront_light;
+            waves::point_images(model, light, spots, interrupted)
         },
         slot: |analyses| &mut analyses.point_images,
         known: None,

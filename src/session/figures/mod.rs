@@ -81,6 +81,13 @@ impl Subject<'_> {
         if alike > 1 { wavelength_text(*um) } else { whole(*um) }
     }
 
+    /// The name of the light of a wavelength in micrometres, or of all of them.
+    fn light(&self, um: Option<f64>) -> String {
+        let Some(um) = um else { return "all wavelengths".to_owned() };
+        let place = self.wavelengths().iter().position(|known| *known == um);
+        place.map_or_else(|| wavelength_text(um), |index| self.wavelength(index))
+    }
+
     /// The name of the primary wavelength.
     fn primary(&self) -> String {
         self.wavelength(self.numbers.ray_model.value.primary)

@@ -6,7 +6,7 @@ use crate::analysis::{
 };
 use crate::plot::{ChartCurve, ContourGrid, CurveChart, contour_curves};
 use crate::report::{AnalysisFigure, note_number};
-use crate::session::analysis::FieldWavefront;
+use crate::session::analysis::{ENERGY_SHARES, FieldWavefront};
 use crate::session::clock::Timed;
 
 /// The intensities below this share of the peak that a logarithmic chart leaves out.
@@ -28,7 +28,7 @@ fn grid_table(title: String, axes: [&'static str; 2], grid: &SquareGrid<f64>) ->
 /// The contour lines of the wavefront over the pupil.
 pub(super) fn maps(subject: &Subject<'_>) -> Option<AnalysisFigure> {
     let found = subject.numbers.wavefronts.as_ref()?;
-    let mut notes = vec![format!("waves of {}", subject.primary())];
+    let mut notes = vec![format!("waves of {}", subject.light(Some(found.value.um)))];
     let (mut charts, mut tables) = (Vec::new(), Vec::new());
     for (i, field) in found.value.fields.iter().enumerate() {
         let name = subject.field(i);
@@ -60,7 +60,8 @@ pub(super) fn maps(subject: &Subject<'_>) -> Option<AnalysisFigure> {
 /// The Zernike coefficients as bars over their numbers.
 pub(super) fn coefficients(subject: &Subject<'_>) -> Option<AnalysisFigure> {
     let found = subject.numbers.wavefronts.as_ref()?;
-    let mut notes = vec![format!("Noll's order, waves of {}", subject.primary())];
+    let light = subject.light(Some(found.value.um));
+    let mut notes = vec![format!("Noll's order, waves of {light}")];
     let (mut bars, mut ends) = (Vec::new(), Vec::new());
     let count = found.value.fields.len().max(1) as f64;
     for (i, field) in found.value.fields.iter().enumerate() {
@@ -142,7 +143,7 @@ pub(super) fn point_spread(subject: &Subject<'_>) -> Option<AnalysisFigure> {
     let found = subject.numbers.point_images.as_ref()?;
     let about =
         "intensity over the peak without aberrations, about the image point of the chief ray";
-    let mut notes = vec![format!("{about}, {}", subject.primary())];
+    let mut notes = vec![format!("{about}, {}", subject.light(found.value.um))];
     let (mut rows, mut tables) = (Vec::new(), Vec::new());
     for (i, field) in found.value.fields.iter().enumerate() {
         let name = subject.field(i);
@@ -180,11 +181,34 @@ fn energy_curve(
     ChartCurve::new(name, color, std::iter::once((0.0, Some(0.0))).chain(circles))
 }
 
+/// Lines from the axis up to the curve at the radii of the circles that hold shares of the light.
+fn share_marks(name: &str, color: usize, radii: &[Option<Estimate>]) -> Vec<ChartCurve> {
+    let mark = |(share, radius): (&f64, &Option<Estimate>)| {
+        let radius = 1e3 * radius.as_ref()?.value;
+        let ends = [(radius, Some(0.0)), (radius, Some(*share))];
+        let name = format!("{name} radius of {:.0} %", 100.0 * share);
+        Some(ChartCurve::new(name, color, ends).dashed())
+    };
+    ENERGY_SHARES.iter().zip(radii).filter_map(mark).collect()
+}
+
+/// The radii of the circles that hold shares of the light.
+fn share_notes(name: &str, radii: &[Option<Estimate>]) -> Vec<String> {
+    let note = |(share, radius): (&f64, &Option<Estimate>)| {
+        let what = format!("{name} radius of {:.0} % of the light", 100.0 * share);
+        radius.as_ref().map_or_else(
+            || format!("{what}: beyond the largest circle"),
+            |radius| estimate_note(&what, radius, " mm"),
+        )
+    };
+    ENERGY_SHARES.iter().zip(radii).map(note).collect()
+}
+
 /// The encircled energy by diffraction.
 pub(super) fn energy(subject: &Subject<'_>) -> Option<AnalysisFigure> {
     let found = subject.numbers.point_images.as_ref()?;
     let about = "by diffraction, about the image point of the chief ray";
-    let mut notes = vec![format!("{about}, {}", subject.primary())];
+    let mut notes = vec![format!("{about}, {}", subject.light(found.value.um))];
     let mut curves = Vec::new();
     for (i, field) in found.value.fields.iter().enumerate() {
         let name = subject.field(i);
@@ -192,6 +216,12 @@ pub(super) fn energy(subject: &Subject<'_>) -> Option<AnalysisFigure> {
             Ok(image) => {
                 let circles = image.energy.iter().map(|(radius, share)| (*radius, share.value));
                 curves.push(energy_curve(name.clone(), i, circles));
+                let radii = image.energy.iter().map(|(radius, _)| *radius);
+                let perfect = radii.zip(image.perfect.iter().copied());
+                let limit = format!("{name} without aberrations");
+                curves.push(energy_curve(limit, i, perfect).dashed());
+                curves.extend(share_marks(&name, i, &image.share_radii));
+                notes.extend(share_notes(&name, &image.share_radii));
                 let error = image.energy.iter().map(|(_, share)| share.error).fold(0.0, f64::max);
                 notes.push(format!(
                     "{name}: ± {error:.0e}, {} rays, {}",
@@ -249,6 +279,10 @@ pub(super) fn ray_energy(subject: &Subject<'_>) -> Option<AnalysisFigure> {
             Ok(found) => {
                 let shares = found.image.energy.iter().map(|share| share.value);
                 curves.push(energy_curve(name.clone(), i, found.radii.iter().copied().zip(shares)));
+                let share_radii: Vec<_> =
+                    found.image.share_radii.iter().copied().map(Some).collect();
+                curves.extend(share_marks(&name, i, &share_radii));
+                notes.extend(share_notes(&name, &share_radii));
                 let error = found.image.energy.iter().map(|share| share.error).fold(0.0, f64::max);
                 let rays = found.image.rays;
                 notes.push(format!("{name}: ± {error:.0e}, {rays} rays, {}", ms_text(field.ms)));

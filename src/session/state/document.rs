@@ -172,6 +172,7 @@ impl Session {
         self.begin_journal();
         self.settings.zoom = 0;
         self.settings.pupil_wavelength = None;
+        self.settings.wavefront_light = None;
         self.selected = None;
         self.document += 1;
         self.set_design(lens);

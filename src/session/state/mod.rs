@@ -316,6 +316,7 @@ impl Session {
             PanelSetting::ToleranceFrequency(nu) => settings.tolerance_frequency = nu,
             PanelSetting::Loosest(goal) => settings.loosest = goal,
             PanelSetting::PupilWavelength(wavelength) => settings.pupil_wavelength = wavelength,
+            PanelSetting::WavefrontLight(light) => settings.wavefront_light = light,
         });
         self.message_is_recent = is_recent;
     }

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use egui::{
-    Align, Button, Color32, ColorImage, Grid, Image, Layout, RichText, ScrollArea, TextureHandle,
-    TextureOptions, Ui, vec2,
+    Align, Button, Color32, ColorImage, ComboBox, Grid, Image, Layout, Rect, RichText, ScrollArea,
+    Sense, TextureHandle, TextureOptions, Ui, vec2,
 };
 
 use super::figure_view::{ChartForm, accuracy_section, bare_chart, export_menu};
@@ -12,23 +12,32 @@ use super::widgets::swatch;
 use super::{
     Panel, displayed_results, field_name, plain_error, relative_error, show_missing_results,
 };
-use crate::analysis::{Estimate, SquareGrid, ZernikeOrder, ZernikeSum, aberration_name};
+use crate::analysis::{
+    Estimate, ImageLight, SquareGrid, ZernikeOrder, ZernikeSum, aberration_name,
+};
 use crate::lens::Fields;
+use crate::pupil::RayModel;
 use crate::report::FigureKind;
 use crate::session::{
-    Analyses, AnalysisResults, Command, FieldRayImage, FieldWavefront, FieldWavefronts,
-    PanelSetting, PointImage, PointImages, RayImages, SessionView, Timed, analysis_figure,
+    Analyses, AnalysisResults, Command, ENERGY_SHARES, FieldRayImage, FieldWavefront,
+    FieldWavefronts, PanelSetting, PointImage, PointImages, RayImages, SessionView, Timed,
+    analysis_figure,
 };
 use crate::studio::actions::Actions;
 use crate::studio::cached::{ByAddress, Cached};
 use crate::studio::colormap;
+use crate::studio::form::named_list;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 
 /// The least and the largest side of a map.
-const SIDE: [f32; 2] = [96.0, 260.0];
-/// The room for the words above and below a map.
+const SIDE: [f32; 2] = [96.0, 420.0];
+/// The room for the words above and below a map, and for its scale of colours.
 const WORDS: f32 = 66.0;
+const SCALE: f32 = 28.0;
+/// The height of the bar of such a scale, and its steps.
+const BAR: f32 = 8.0;
+const STEPS: usize = 64;
 /// The room between maps.
 const GAP: f32 = 10.0;
 /// The decades of a logarithmic image.
@@ -125,7 +134,11 @@ impl Panel for WavefrontPanel {
         let Some((results, numbers)) = displayed_results(view) else {
             return show_missing_results(ui, view);
         };
-        self.pages(ui, actions);
+        ui.horizontal_wrapped(|ui| {
+            self.pages(ui);
+            self.light(ui, view, numbers, actions);
+            export_menu(ui, self.page.figure(self.by_rays), actions);
+        });
         self.ask(view, actions);
         let kind = self.kind();
         if self.page == WavefrontPage::Image && !self.by_rays {
@@ -193,7 +206,9 @@ impl<'a> PageNumbers<'a> {
         let at = |um: f64| format!("at {:.0} nm", 1e3 * um);
         let (light, ms) = match self {
             Self::Waves(waves) => (at(waves.value.um), waves.ms),
-            Self::Images(images) => (at(images.value.um), images.ms),
+            Self::Images(images) => {
+                (images.value.um.map_or_else(|| "all wavelengths".to_owned(), at), images.ms)
+            }
             Self::Rays(images) => ("all wavelengths".to_owned(), images.ms),
         };
         let rays: usize = (0..self.count()).filter_map(|i| self.rays(i)).sum();
@@ -232,6 +247,35 @@ impl<'a> PageNumbers<'a> {
             Self::Rays(images) => images.value.fields[field].value.as_ref().map(ray_lines),
         }
         .map_err(ToString::to_string)
+    }
+
+    /// The scale of the colours of a map.
+    fn scale(self, ui: &mut Ui, field: usize, side: f32) {
+        let Self::Waves(waves) = self else { return };
+        let Ok(found) = &waves.value.fields[field].value else { return };
+        let (most, is_dark) = (largest(&found.map), ui.visuals().dark_mode);
+        let end = number::format_digits(most, 3);
+        color_scale(ui, side, [format!("-{end} λ"), format!("{end} λ")], |share| {
+            let [r, g, b] = colormap::diverging(2.0 * share - 1.0, is_dark);
+            Color32::from_rgb(r, g, b)
+        });
+    }
+
+    /// The meaning of the numbers below a picture.
+    const fn hint(self) -> &'static str {
+        match self {
+            Self::Waves(_) => {
+                "RMS without piston; P-V: the largest path difference less the smallest over the map. Paths are \
+                 compared with that of the chief ray on a sphere about its image point"
+            }
+            Self::Images(_) => {
+                "The Strehl ratio at the image point of the chief ray, and the largest one found in space: \
+                 \"locally best\" where not all of the blur was searched, as in the light of several wavelengths"
+            }
+            Self::Rays(_) => {
+                "The circles about the image point of the chief ray that hold these shares"
+            }
+        }
     }
 
     /// The picture of a field; `None` if there is none.
@@ -276,35 +320,67 @@ impl WavefrontPanel {
         }
     }
 
-    fn pages(&mut self, ui: &mut Ui, actions: &mut Actions) {
-        ui.horizontal_wrapped(|ui| {
-            ui.spacing_mut().item_spacing.x = 2.0;
-            for (page, name, hint) in PAGES {
-                let button = Button::selectable(self.page == page, name);
-                if ui.add(button).on_hover_text(hint).clicked() {
-                    self.page = page;
-                }
+    fn pages(&mut self, ui: &mut Ui) {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        for (page, name, hint) in PAGES {
+            let button = Button::selectable(self.page == page, name);
+            if ui.add(button).on_hover_text(hint).clicked() {
+                self.page = page;
             }
-            if self.page.shows_images() {
-                let diffraction = "By diffraction at the primary wavelength";
-                ui.selectable_value(&mut self.by_rays, false, "Diffraction")
-                    .on_hover_text(diffraction);
-                let rays = "By rays alone, over all wavelengths";
-                ui.selectable_value(&mut self.by_rays, true, "Rays").on_hover_text(rays);
+        }
+        if self.page.shows_images() {
+            let diffraction = "By diffraction at one wavelength or at all of them";
+            ui.selectable_value(&mut self.by_rays, false, "Diffraction").on_hover_text(diffraction);
+            let rays = "By rays alone, over all wavelengths";
+            ui.selectable_value(&mut self.by_rays, true, "Rays").on_hover_text(rays);
+        }
+        if self.page == WavefrontPage::Zernike {
+            let noll = "Noll's order, whose terms have an RMS of 1";
+            ui.selectable_value(&mut self.is_fringe, false, "Noll").on_hover_text(noll);
+            let fringe = "The fringe order, whose terms are 1 at the rim";
+            ui.selectable_value(&mut self.is_fringe, true, "Fringe").on_hover_text(fringe);
+        }
+        if self.page == WavefrontPage::Image {
+            let hint = format!("Intensities down to {:.0e} of the largest", 10f64.powf(-DECADES));
+            ui.checkbox(&mut self.is_logarithmic, "Logarithmic").on_hover_text(hint);
+        }
+    }
+
+    /// The choice of the wavelength of what is shown, if there are several: of images all of them too. Images by
+    /// rays are always those of all.
+    fn light(&self, ui: &mut Ui, view: &SessionView, numbers: &Analyses, actions: &mut Actions) {
+        let model = &numbers.ray_model.value;
+        if model.channels.len() < 2 || self.kind() == NumberKind::RayImages {
+            return;
+        }
+        let can_be_all = self.page.shows_images();
+        let shown = match view.settings.wavefront_light {
+            Some(ImageLight::Wavelength(index)) if index < model.channels.len() => {
+                ImageLight::Wavelength(index)
             }
-            if self.page == WavefrontPage::Zernike {
-                let noll = "Noll's order, whose terms have an RMS of 1";
-                ui.selectable_value(&mut self.is_fringe, false, "Noll").on_hover_text(noll);
-                let fringe = "The fringe order, whose terms are 1 at the rim";
-                ui.selectable_value(&mut self.is_fringe, true, "Fringe").on_hover_text(fringe);
+            Some(ImageLight::All) if can_be_all => ImageLight::All,
+            _ => ImageLight::Wavelength(model.primary),
+        };
+        let name = |light: ImageLight| match light {
+            ImageLight::Wavelength(index) => wavelength_name(model, index),
+            ImageLight::All => "All wavelengths".to_owned(),
+        };
+        let mut chosen = shown;
+        let combo = ComboBox::from_id_salt("wavefront wavelength").width(96.0);
+        let combo = combo.selected_text(name(shown)).show_ui(ui, |ui| {
+            for index in 0..model.channels.len() {
+                let primary = if index == model.primary { ", primary" } else { "" };
+                let light = ImageLight::Wavelength(index);
+                ui.selectable_value(&mut chosen, light, format!("{}{primary}", name(light)));
             }
-            if self.page == WavefrontPage::Image {
-                let hint =
-                    format!("Intensities down to {:.0e} of the largest", 10f64.powf(-DECADES));
-                ui.checkbox(&mut self.is_logarithmic, "Logarithmic").on_hover_text(hint);
+            if can_be_all {
+                ui.selectable_value(&mut chosen, ImageLight::All, name(ImageLight::All));
             }
-            export_menu(ui, self.page.figure(self.by_rays), actions);
         });
+        named_list(ui, combo, "Wavelength of the wavefront");
+        if chosen != shown {
+            actions.push(Command::Show(PanelSetting::WavefrontLight(Some(chosen))));
+        }
     }
 
     /// A picture of each field, as many beside each other as there is room for.
@@ -326,7 +402,7 @@ impl WavefrontPanel {
             (0..found.count()).map(texture).collect()
         });
         let count = textures.len().max(1) as f32;
-        let room = ui.available_size() - vec2(0.0, WORDS);
+        let room = ui.available_size() - vec2(0.0, WORDS + SCALE);
         let side = (room.x / count - GAP).min(room.y).clamp(SIDE[0], SIDE[1]);
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             let from_top = Layout::left_to_right(Align::Min).with_main_wrap(true);
@@ -338,6 +414,11 @@ impl WavefrontPanel {
             });
         });
     }
+}
+
+/// The name of a wavelength of a model.
+fn wavelength_name(model: &RayModel, index: usize) -> String {
+    model.channels.get(index).map_or_else(String::new, |wave| format!("{:.1} nm", 1e3 * wave.um))
 }
 
 /// The path differences of a field as a picture.
@@ -382,7 +463,7 @@ type CellContent<'a> = (PageNumbers<'a>, Option<&'a TextureHandle>);
 /// A field, its picture and the numbers of it.
 fn cell(ui: &mut Ui, field: (&Fields, usize), content: CellContent<'_>, side: f32) {
     let from_top = Layout::top_down(Align::Min);
-    ui.allocate_ui_with_layout(vec2(side, side + WORDS), from_top, |ui| {
+    ui.allocate_ui_with_layout(vec2(side, side + WORDS + SCALE), from_top, |ui| {
         ui.set_width(side);
         let name = heading(ui, field.0, field.1);
         cell_content(ui, (&name, field.1), content, side);
@@ -413,9 +494,29 @@ fn cell_content(
         ui.add(Image::new(texture).fit_to_exact_size(vec2(side, side)).alt_text(words))
             .on_hover_text(format!("{rays} rays, {:.1} ms", found.ms(field)));
     }
+    found.scale(ui, field, side);
     for line in lines {
-        ui.label(RichText::new(line).small());
+        ui.label(RichText::new(line).small()).on_hover_text(found.hint());
     }
+}
+
+/// A bar of the colours of a scale with the numbers at its ends.
+fn color_scale(ui: &mut Ui, side: f32, ends: [String; 2], color: impl Fn(f64) -> Color32) {
+    let (bar, _) = ui.allocate_exact_size(vec2(side, BAR), Sense::hover());
+    let step = side / STEPS as f32;
+    for i in 0..STEPS {
+        let corner = bar.min + vec2(step * i as f32, 0.0);
+        // Steps overlap, so that no gap is seen between them.
+        let part = Rect::from_min_size(corner, vec2(1.5 * step, BAR)).intersect(bar);
+        ui.painter().rect_filled(part, 0.0, color((i as f64 + 0.5) / STEPS as f64));
+    }
+    ui.horizontal(|ui| {
+        let [low, high] = ends;
+        ui.label(RichText::new(low).small().weak());
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            ui.label(RichText::new(high).small().weak());
+        });
+    });
 }
 
 /// The name of a field with its colour.
@@ -441,43 +542,55 @@ fn estimate_text(estimate: Estimate, unit: &str) -> String {
 }
 
 fn map_lines(found: &FieldWavefront) -> Vec<String> {
-    let most = number::format_digits(largest(&found.map), 3);
+    let waves = || found.map.values.iter().flatten().copied();
+    let high = waves().fold(f64::NEG_INFINITY, f64::max);
+    let low = waves().fold(f64::INFINITY, f64::min);
     let rms = estimate_text(found.wavefront.rms, " λ");
-    vec![format!("RMS {rms}"), format!("within ± {most} λ")]
+    let range = number::format_digits((high - low).max(0.0), 3);
+    vec![format!("RMS {rms}"), format!("P-V {range} λ")]
 }
 
 fn image_lines(image: &PointImage) -> Vec<String> {
     let width = number::format_digits(2e3 * image.intensity.half_width, 3);
     vec![
-        format!("Strehl {}", estimate_text(image.strehl.at_chief, "")),
-        format!("{} {}", image.strehl.best_name(), estimate_text(image.strehl.best, "")),
+        format!("Strehl {} at the chief ray", estimate_text(image.strehl.at_chief, "")),
+        format!("{} Strehl {}", image.strehl.best_name(), estimate_text(image.strehl.best, "")),
         format!("{width} µm wide, intensity {}", plain_error(image.error, "")),
     ]
 }
 
 fn ray_lines(found: &FieldRayImage) -> Vec<String> {
     let width = number::format_digits(2e3 * found.image.density.half_width, 3);
-    let half = half_energy(found);
+    let shares = found.image.share_radii.iter().copied().map(Some).collect::<Vec<_>>();
     vec![
-        half.map_or("half the light: beyond the image".to_owned(), |radius| {
-            format!("half the light within {} µm", number::format_digits(1e3 * radius, 3))
-        }),
+        share_text(&shares),
         format!("{width} µm wide, {} of the peak", plain_error(100.0 * found.image.error, " %")),
     ]
 }
 
-/// The radius of the circle with half of the light, between the circles that are known, in mm.
-fn half_energy(found: &FieldRayImage) -> Option<f64> {
-    let circles = found.radii.iter().zip(&found.image.energy);
-    let mut before = (0.0, 0.0);
-    for (radius, share) in circles {
-        if share.value >= 0.5 {
-            let part = (0.5 - before.1) / (share.value - before.1);
-            return Some(before.0 + part * (radius - before.0));
-        }
-        before = (*radius, share.value);
+/// The radii of the circles that hold shares of the light.
+fn share_text(radii: &[Option<Estimate>]) -> String {
+    let text = |(share, radius): (&f64, &Option<Estimate>)| {
+        let within = radius.map_or_else(
+            || "beyond the image".to_owned(),
+            |radius| format!("within {} µm", number::format_digits(1e3 * radius.value, 3)),
+        );
+        format!("{:.0} % {within}", 100.0 * share)
+    };
+    let list: Vec<String> = ENERGY_SHARES.iter().zip(radii).map(text).collect();
+    list.join(", ")
+}
+
+/// The radii of shares of a field; `None` without light.
+fn field_shares(results: &AnalysisResults, kind: FigureKind, field: usize) -> Option<String> {
+    let numbers = results.analyses.as_ref().ok()?;
+    if kind == FigureKind::RayEnergy {
+        let found = numbers.ray_images.as_ref()?.value.fields.get(field)?.value.as_ref().ok()?;
+        let radii = found.image.share_radii.iter().copied().map(Some).collect::<Vec<_>>();
+        return Some(share_text(&radii));
     }
-    None
+    let found = numbers.point_images.as_ref()?.value.fields.get(field)?.value.as_ref().ok()?;
+    Some(share_text(&found.share_radii))
 }
 
 /// The share of the light within circles, a curve for each field.
@@ -491,8 +604,14 @@ fn energies(ui: &mut Ui, results: &AnalysisResults, kind: FigureKind) {
         ui.label(RichText::new("share of the light").small());
         for i in 0..fields.values.len() {
             heading(ui, fields, i);
+            if let Some(shares) = field_shares(results, kind, i) {
+                ui.label(RichText::new(shares).small());
+            }
         }
     });
+    let limit = if kind == FigureKind::Energy { "dashed curve: without aberrations; " } else { "" };
+    let marks = format!("{limit}upright: the radii of 50 % and 80 %");
+    ui.label(RichText::new(marks).small().weak());
     let height = (ui.available_height() - 24.0).max(SIDE[0]);
     for chart in figure.rows.iter().flatten() {
         if chart.curves.is_empty() {
