@@ -46,10 +46,10 @@ pub use color_error::{
 pub use contrast_over_field::{ContrastAtHeight, contrast_over_field};
 pub use diffraction::{
     DiffractionGate, EncircledEnergy, EncircledRequest, ImageLight, PointSpread, PupilCurve,
-    PupilFunction, PupilSamples, RayTransfer, Strehl, TransferAtFrequency, TransferRays,
-    diffraction_gate, diffraction_mtf, encircled_energy, encircled_energy_unless, point_spread,
-    point_spread_unless, polychromatic_diffraction_mtf, polychromatic_diffraction_mtf_unless,
-    strehl, strehl_unless, through_focus_mtf,
+    PupilFunction, PupilSamples, RayTransfer, RoundPupil, Strehl, TransferAtFrequency,
+    TransferRays, diffraction_gate, diffraction_mtf, encircled_energy, encircled_energy_unless,
+    point_spread, point_spread_unless, polychromatic_diffraction_mtf,
+    polychromatic_diffraction_mtf_unless, strehl, strehl_unless, through_focus_mtf,
 };
 pub use distortion::{
     Distortion, FieldCurvature, GridPoint, chief_points, distortion, distortion_grid,

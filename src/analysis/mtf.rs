@@ -21,8 +21,12 @@ pub struct TransferValue {
     pub re: f64,
     /// The imaginary part.
     pub im: f64,
-    /// The modulus: the contrast; its error is that of the complex number.
+    /// The modulus: the contrast; its error is that of the complex number, the share of the reference sphere
+    /// included.
     pub modulus: Estimate,
+    /// What the choice of the reference sphere leaves uncertain, a part of that error: the change on doubling its
+    /// radius. No computation makes it less. 0 for contrast by rays.
+    pub sphere: f64,
 }
 
 /// The contrast at one spatial frequency.
@@ -43,10 +47,13 @@ pub struct MtfCurve {
     pub points: Vec<MtfPoint>,
     /// The image point that phases are counted from, x and y in mm.
     pub origin: [f64; 2],
-    /// True if the tolerance was reached at every frequency.
+    /// True if errors of the computation are within the tolerance at every frequency: without what the
+    /// reference sphere leaves.
     pub reached: bool,
     /// The cause of errors above the tolerance; `None` if it was reached.
     pub limit: Option<ContrastLimit>,
+    /// The largest part of an error that the choice of the reference sphere leaves.
+    pub sphere: f64,
     /// The number of rays traced.
     pub rays: usize,
     /// The share of the weight of wavelengths without light, which are left out.
@@ -57,8 +64,6 @@ pub struct MtfCurve {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ContrastLimit {
-    /// The choice of the reference sphere: the change on doubling its radius.
-    Sphere(f64),
     /// The rest that polynomials leave of path differences and amplitudes.
     Polynomials(f64),
     /// The number of rays and of quadrature nodes.
@@ -68,7 +73,7 @@ pub enum ContrastLimit {
 impl ContrastLimit {
     /// The largest error that it leaves.
     pub fn error(self) -> f64 {
-        let (Self::Sphere(error) | Self::Polynomials(error) | Self::Nodes(error)) = self;
+        let (Self::Polynomials(error) | Self::Nodes(error)) = self;
         error
     }
 }
@@ -76,7 +81,6 @@ impl ContrastLimit {
 impl Display for ContrastLimit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let what = match self {
-            Self::Sphere(_) => "the choice of the reference sphere",
             Self::Polynomials(_) => "what polynomials leave of the wavefront",
             Self::Nodes(_) => "the number of rays",
         };
@@ -87,7 +91,38 @@ impl Display for ContrastLimit {
 impl TransferValue {
     /// A complex value with its error.
     pub(super) fn new(re: f64, im: f64, error: f64, rays: usize) -> Self {
-        Self { re, im, modulus: Estimate::new(re.hypot(im), error, rays) }
+        Self { re, im, modulus: Estimate::new(re.hypot(im), error, rays), sphere: 0.0 }
+    }
+
+    /// The same value with what the choice of the reference sphere leaves added to its error.
+    pub(super) fn with_sphere(mut self, change: f64) -> Self {
+        self.modulus.error += change;
+        self.sphere += change;
+        self
+    }
+
+    /// The error of the computation: without what the choice of the reference sphere leaves.
+    pub fn numerical_error(&self) -> f64 {
+        (self.modulus.error - self.sphere).max(0.0)
+    }
+}
+
+impl MtfCurve {
+    /// The same curve with what the choice of the reference sphere leaves, tangential and sagittal one after the
+    /// other.
+    pub(super) fn with_sphere(mut self, changes: &[f64]) -> Self {
+        for (point, change) in self.points.iter_mut().zip(changes.chunks_exact(2)) {
+            point.tangential = point.tangential.with_sphere(change[0]);
+            point.sagittal = point.sagittal.with_sphere(change[1]);
+        }
+        self.sphere = largest_by_sphere(&self.points);
+        self
+    }
+
+    /// The largest error of the computation: without what the choice of the reference sphere leaves.
+    pub fn numerical_error(&self) -> f64 {
+        let values = self.points.iter().flat_map(|point| [point.tangential, point.sagittal]);
+        values.map(|value| value.numerical_error()).fold(0.0, f64::max)
     }
 }
 
@@ -315,9 +350,16 @@ pub(super) fn curve(
         origin,
         reached: limit.is_none(),
         limit,
+        sphere: 0.0,
         rays: found.rays,
         dark_share: 0.0,
     }
+}
+
+/// The largest part of an error that the choice of the reference sphere leaves.
+pub(super) fn largest_by_sphere(points: &[MtfPoint]) -> f64 {
+    let parts = points.iter().flat_map(|point| [point.tangential.sphere, point.sagittal.sphere]);
+    parts.fold(0.0, f64::max)
 }
 
 /// The image point that phases are counted from: that of the chief ray at the primary wavelength, or
@@ -497,15 +539,19 @@ pub(super) fn sum_wavelengths(
         let mean = |part: &dyn Fn(&TransferValue) -> f64| -> f64 {
             lit.iter().map(|(weight, curve)| weight / light * part(&of(curve))).sum()
         };
-        TransferValue::new(mean(&|v| v.re), mean(&|v| v.im), mean(&|v| v.modulus.error), rays)
+        let error = mean(&|v| v.numerical_error());
+        TransferValue::new(mean(&|v| v.re), mean(&|v| v.im), error, rays)
+            .with_sphere(mean(&|v| v.sphere))
     };
     let point = |i: usize| MtfPoint {
         frequency: first.points[i].frequency,
         tangential: sum(&|curve| curve.points[i].tangential),
         sagittal: sum(&|curve| curve.points[i].sagittal),
     };
+    let points: Vec<MtfPoint> = (0..first.points.len()).map(point).collect();
     Ok(MtfCurve {
-        points: (0..first.points.len()).map(point).collect(),
+        sphere: largest_by_sphere(&points),
+        points,
         origin: first.origin,
         reached: lit.iter().all(|(_, curve)| curve.reached),
         limit: limits.max_by(|a, b| a.error().total_cmp(&b.error())),

@@ -18,7 +18,7 @@ use serde::Serialize;
 pub struct AccuracyPoint {
     /// The absolute tolerance asked for.
     pub tolerance: f64,
-    /// The largest error that the numbers state.
+    /// The largest error that the numbers state, without what the choice of a reference sphere leaves.
     pub stated: f64,
     /// The largest difference from the reference.
     pub error: f64,
@@ -122,7 +122,7 @@ impl Trial {
         let values = curve.points.iter().flat_map(|point| [point.tangential, point.sagittal]);
         let values: Vec<TransferValue> = values.collect();
         Self {
-            stated: values.iter().map(|value| value.modulus.error).fold(0.0, f64::max),
+            stated: curve.numerical_error(),
             values: values.iter().map(|value| [value.re, value.im]).collect(),
             reached: curve.reached,
             rays: curve.rays,

@@ -13,6 +13,7 @@ mod glasses;
 mod gradient;
 mod grin;
 mod grin_starts;
+mod images;
 mod limits;
 mod machine;
 mod minima;
@@ -45,6 +46,9 @@ pub use grin::{
     GrinBenchmark, GrinBenchmarkError, GrinCost, GrinCurves, GrinMemory, GrinRow, measure_grin,
 };
 pub use grin_starts::GrinStarts;
+pub use images::{
+    ImageAnswers, ImageEntry, ImageField, ImageFileError, ImageLens, image_kinds, measure_images,
+};
 pub use limits::{LimitComparison, LimitedDescent, compare_limit_treatments};
 pub use machine::{Machine, MemoryUse, age_ms, peak_megabytes, processor_ms};
 pub use minima::{MinimaCount, count_minima};

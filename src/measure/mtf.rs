@@ -47,8 +47,10 @@ pub struct TransferRow {
     pub method: TransferMethod,
     /// The tolerance asked for.
     pub tolerance: f64,
-    /// The largest error estimate.
+    /// The largest error estimate, without what the reference sphere leaves.
     pub stated: f64,
+    /// What the choice of the reference sphere leaves at most; charts on the same sphere do not differ by it.
+    pub sphere: f64,
     /// The largest difference from the reference.
     pub error: f64,
     /// True if every curve says that it reached the tolerance.
@@ -191,7 +193,8 @@ impl TransferChart<'_> {
         Ok(TransferRow {
             method,
             tolerance,
-            stated: values(&found).map(|value| value.modulus.error).fold(0.0, f64::max),
+            stated: found.iter().map(MtfCurve::numerical_error).fold(0.0, f64::max),
+            sphere: found.iter().map(|curve| curve.sphere).fold(0.0, f64::max),
             error: pairs.map(off).fold(0.0, f64::max),
             reached: found.iter().all(|curve| curve.reached),
             limit: limits.max_by(|a, b| a.error().total_cmp(&b.error())),

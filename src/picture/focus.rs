@@ -26,6 +26,14 @@ pub fn focused(lens: &Lens, zoom: usize, distance: f64) -> Result<Lens, PictureE
     if along > 0.0 { Ok(moved) } else { Err(PictureError::NotImaged { distance }) }
 }
 
+/// Behind a thin lens that is focused at a distance, the distance of its sharp image, and the diameter of the disc
+/// there that an object point at another distance makes; all in mm, with objects beyond the focal length.
+pub fn thin_lens_blur(focal: f64, f_number: f64, focus: f64, object: f64) -> [f64; 2] {
+    let image = |distance: f64| focal * distance / (distance - focal);
+    let [sharp, own] = [focus, object].map(image);
+    [sharp, focal / f_number * (own - sharp).abs() / own]
+}
+
 /// The surfaces of a focus group, from the first to the last, by their indices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FocusGroup {

@@ -65,6 +65,21 @@ impl Scene {
         Ok(Self { layers, background, white })
     }
 
+    /// A wave of contrast 0.5 by its two frequencies and its phase: in cycles/mm on a plane at a distance in mm, or by
+    /// the tangents of the direction of light.
+    ///
+    /// # Errors
+    /// A plane that is not in front of the lens.
+    pub fn wave([fx, fy, phase]: [f64; 3], distance: Option<f64>) -> Result<Self, PictureError> {
+        // Light comes from the opposite side of where it goes.
+        let frequency = if distance.is_some() { [fx, fy] } else { [-fx, -fy] };
+        let pattern = Pattern::Wave { contrast: 0.5, frequency, phase };
+        let half_size = [f64::INFINITY; 2];
+        let layer =
+            SceneLayer { distance, center: [0.0; 2], half_size, velocity: [0.0; 2], pattern };
+        Self::new(vec![layer], [0.0; 3], 1.0)
+    }
+
     /// The same scene, whose only plane has this width in mm, and its height in proportion.
     ///
     /// # Errors

@@ -36,6 +36,13 @@ pub fn black_body_photons(kelvin: f64, [from, to]: [f64; 2]) -> f64 {
 const WIDE: f64 = 10.0;
 
 impl SensorModel {
+    /// The mean and the variance of a pixel's number by the linear model of EMVA 1288, without clipping.
+    pub fn linear_moments(&self, photons: f64, dark: f64) -> [f64; 2] {
+        let electrons = self.quantum_efficiency * photons + dark;
+        let variance = self.gain.powi(2) * (self.read_noise.powi(2) + electrons) + 1.0 / 12.0;
+        [self.gain * electrons + self.black_level, variance]
+    }
+
     /// The mean and the variance of a pixel's number for a mean number of photons and of dark electrons:
     /// sums over its electrons and over the numbers that read noise makes of them.
     pub fn exact_moments(&self, photons: f64, dark: f64) -> [f64; 2] {

@@ -6,6 +6,13 @@
 
 use crate::math::{SimdWidth, run_vectorized};
 use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// The contrast that steady motion over a way in mm leaves at a frequency along it in cycles/mm.
+pub fn smear_contrast(way: f64, frequency: f64) -> f64 {
+    let phase = PI * way * frequency;
+    if phase == 0.0 { 1.0 } else { phase.sin() / phase }
+}
 
 /// Red, green and blue times cover, and cover.
 pub(super) type PaintTexel = [f32; 4];
@@ -106,7 +113,6 @@ fn taps(way: [f64; 2]) -> Vec<SmearTap> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f64::consts::PI;
 
     /// Waves along any way keep the contrast that their mean over it has, sin(x)/x, and no light is lost.
     #[test]

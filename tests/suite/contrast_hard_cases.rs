@@ -98,7 +98,7 @@ fn a_lens_with_a_spider_is_refused_by_name_and_has_a_contrast_of_rays() {
 #[test]
 fn contrast_beyond_a_cutoff_is_exactly_zero_and_others_remain() {
     let lens = &image_lenses()[0];
-    let (_, model, field) = lens.fields().remove(0);
+    let (_, model, field) = lens.fields().unwrap().remove(0);
     let widest = 2.0 * (0.5 / model.first_order.working_f_number.unwrap()).atan().sin();
     let longest = |a: &usize, b: &usize| model.channels[*a].um.total_cmp(&model.channels[*b].um);
     let red = (0..model.channels.len()).max_by(longest).unwrap();

@@ -1,6 +1,6 @@
 //! The cases of `images.json` that commands answer: pupils, coatings, light, sensors and ghosts.
 
-use crate::cli::{Scratch, done, done_json, refused};
+use crate::cli::{Scratch, aplanat, done, done_json, refused};
 use crate::reference::{count, number, numbers, read};
 use serde_json::{Value, json};
 
@@ -489,4 +489,27 @@ fn a_high_frequency_spoils_no_other() {
             assert!((found - own).abs() <= error + 1e-12, "{found} {own}");
         }
     }
+}
+
+/// One command compares every case of a file of answers; a broken bound is an exit status and a name.
+#[test]
+fn one_command_compares_a_file_of_answers() {
+    let path = crate::reference::folder().join("images.json");
+    let path = path.to_str().unwrap();
+    let found = done_json(&["measure", "images", path, "--only", "ghosts,photons,ring"], "");
+    let kinds: Vec<&str> =
+        list(&found["kinds"]).iter().map(|kind| kind["kind"].as_str().unwrap()).collect();
+    assert_eq!(kinds, ["ring", "photons", "ghosts"]);
+    assert!(list(&found["kinds"]).iter().all(|kind| kind["kept"] == true), "{found}");
+    let mut file = read("images.json");
+    file["photons"][0]["photons"] = json!("1181.82");
+    let wrong = Scratch::with("images-wrong.json", &file.to_string());
+    let output = aplanat(&["measure", "images", wrong.path(), "--only", "photons,blur"], "");
+    let [text, errors] = [output.stdout, output.stderr].map(|b| String::from_utf8(b).unwrap());
+    assert_eq!(output.status.code(), Some(1), "{text} {errors}");
+    assert!(text.contains("broken") && text.contains("photons[0].photons"), "{text}");
+    assert!(errors.contains("bounds broken: photons"), "{errors}");
+    refused(2, &["measure", "images", path, "--only", "mft"], "", &["--only", "mft", "mtf"]);
+    let lens = "lenses/double_gauss_rudolph_50.json";
+    refused(2, &["measure", "images", lens, "--only", "blur"], "", &["motion", "expected a list"]);
 }

@@ -1,6 +1,6 @@
 //! Pictures by rays backwards: against exact values, against the irradiance, and their own errors.
 
-use crate::images::image_lenses;
+use crate::images::image_lens;
 use crate::reference::{number, read};
 use aplanat::analysis::irradiance;
 use aplanat::files;
@@ -56,23 +56,16 @@ pub(crate) fn samples(count: usize) -> ExactSettings {
 /// The scene of an entry of `images.json`: a wave in the direction of light, or on a plane.
 fn wave_scene(data: &Value) -> Scene {
     let at = |name: &str| number(&data[name]);
-    let (distance, frequency) = if data["kind"] == "infinity" {
-        // Light comes from the opposite side.
-        (None, [-at("fx"), -at("fy")])
-    } else {
-        (Some(at("distance")), [at("gx"), at("gy")])
-    };
-    let pattern = Pattern::Wave { contrast: 0.5, frequency, phase: at("phase") };
-    let half_size = [f64::INFINITY; 2];
-    let layer = SceneLayer { distance, center: [0.0; 2], half_size, velocity: [0.0; 2], pattern };
-    Scene::new(vec![layer], [0.0; 3], 1.0).unwrap()
+    let far = data["kind"] == "infinity";
+    let [x, y] = if far { ["fx", "fy"] } else { ["gx", "gy"] }.map(at);
+    Scene::wave([x, y, at("phase")], (!far).then(|| at("distance"))).unwrap()
 }
 
 #[test]
 fn single_pixels_of_known_scenes() {
     let file = read("images.json");
-    let lens = image_lenses().into_iter().find(|l| l.id() == file["scene"]["lens"]).unwrap();
-    let (model, bands) = (lens.model(true), one_band(lens.primary()));
+    let lens = image_lens(file["scene"]["lens"].as_str().unwrap());
+    let (model, bands) = (lens.model(true).unwrap(), one_band(lens.primary()));
     let mut compared = 0;
     for point in file["scene"]["points"].as_array().unwrap() {
         let frame = point_frame([number(&point["x"]), number(&point["y"])]);

@@ -18,7 +18,8 @@ use std::f64::consts::TAU;
 
 /// The contrast by diffraction of a field at one wavelength and some frequencies in cycles/mm;
 /// errors are absolute. Where the aberrations are so large that the place of the pupil's edge on the
-/// sphere matters, the change on doubling its radius is part of the error.
+/// sphere matters, the change on doubling its radius is part of the error: the model of one exit pupil is not known
+/// better. It is told by itself as well, and takes no part in what the tolerance asks for.
 ///
 /// # Errors
 /// The field is dark, or its pupil folds or has pieces whose edge is not known.
@@ -52,35 +53,21 @@ fn diffraction_mtf_unless(
         let values = function.values(frequencies, 0.0, tolerance, interrupted)?;
         Ok::<_, AnalysisError>((function, values))
     };
-    let uncertain = is_uncertain(&sphere, &region);
-    let mut tolerance = accuracy.tolerance.max(if uncertain { COARSE } else { 0.0 });
-    let (mut function, mut values) = wave(&sphere, frequencies, tolerance)?;
+    let tolerance = accuracy.tolerance;
+    let (function, mut values) = wave(&sphere, frequencies, tolerance)?;
     let mut changes = vec![0.0; 2 * frequencies.len()];
-    if uncertain {
-        let chosen = some_of(frequencies);
-        let some: Vec<f64> = chosen.iter().map(|i| frequencies[*i]).collect();
-        let (_, far) = wave(&sphere.doubled(), &some, tolerance)?;
-        let change = |(i, [t, s]): (&usize, &[TransferValue; 2])| {
-            let off = |a: &TransferValue, b: &TransferValue| (a.re - b.re).hypot(a.im - b.im);
-            [off(&values[*i][0], t), off(&values[*i][1], s)]
-        };
-        let found: Vec<[f64; 2]> = chosen.iter().zip(&far).map(change).collect();
-        changes = spread_changes(frequencies, &some, &found);
-        // More digits than the choice of the sphere leaves are not worth the time, unless somebody asks for
-        // those of this sphere.
-        let is_worth_it = largest(&changes) <= HOPELESS || accuracy.tolerance < BY_RAYS;
-        if accuracy.tolerance < tolerance && is_worth_it {
-            tolerance = accuracy.tolerance;
-            (function, values) = wave(&sphere, frequencies, tolerance)?;
-        }
+    if is_uncertain(&sphere, &region) {
+        let some = some_of(frequencies);
+        let asked: Vec<f64> = some.iter().map(|i| frequencies[*i]).collect();
+        let (_, far) = wave(&sphere.doubled(), &asked, tolerance.max(COARSE))?;
+        let found: Vec<[f64; 2]> =
+            some.iter().zip(&far).map(|(i, far)| change_to(&values[*i], far)).collect();
+        changes = spread_changes(frequencies, &asked, &found);
     }
     if tolerance < BY_RAYS && function.transfer_error() > tolerance {
         refine(&mut values, frequencies, &function, (&region, &sphere), tolerance)?;
     }
-    for (value, change) in values.iter_mut().flatten().zip(&changes) {
-        value.modulus.error += change;
-    }
-    let limit = limit(&values, &changes, &function, accuracy.tolerance);
+    let limit = limit(&values, &function, tolerance);
     let offset = [sphere.center.x - origin[0], sphere.center.y - origin[1]];
     let list = ConvergedList {
         values: flatten(frequencies, &values, offset),
@@ -89,7 +76,16 @@ fn diffraction_mtf_unless(
         orders: 1,
         converged: limit.is_none(),
     };
-    Ok(curve(frequencies, origin, &list, limit))
+    Ok(curve(frequencies, origin, &list, limit).with_sphere(&changes))
+}
+
+/// The changes of the tangential and the sagittal value to those on another sphere, at most: with the errors of
+/// these.
+fn change_to(values: &[TransferValue; 2], far: &[TransferValue; 2]) -> [f64; 2] {
+    [0, 1].map(|k| {
+        let (a, b) = (&values[k], &far[k]);
+        (a.re - b.re).hypot(a.im - b.im) + b.modulus.error
+    })
 }
 
 /// So many frequencies are compared on two spheres one by one; of more, every third.
@@ -129,26 +125,17 @@ fn spread_changes(frequencies: &[f64], some: &[f64], changes: &[[f64; 2]]) -> Ve
     frequencies.iter().flat_map(at).collect()
 }
 
-fn largest(errors: &[f64]) -> f64 {
-    errors.iter().copied().fold(0.0, f64::max)
-}
-
 /// The cause of errors above a tolerance, if they are.
 fn limit(
     values: &[[TransferValue; 2]],
-    changes: &[f64],
     function: &PupilFunction,
     tolerance: f64,
 ) -> Option<ContrastLimit> {
-    let errors: Vec<f64> = values.iter().flatten().map(|value| value.modulus.error).collect();
-    let (error, by_sphere) = (largest(&errors), largest(changes));
-    let limit = if by_sphere >= 0.5 * error {
-        ContrastLimit::Sphere(by_sphere)
-    } else if function.transfer_error() >= 0.5 * (error - by_sphere) {
-        ContrastLimit::Polynomials(function.transfer_error())
-    } else {
-        ContrastLimit::Nodes(error)
-    };
+    let error = values.iter().flatten().map(|value| value.modulus.error).fold(0.0, f64::max);
+    let left = function.transfer_error();
+    let by_polynomials = left >= 0.5 * error;
+    let limit =
+        if by_polynomials { ContrastLimit::Polynomials(left) } else { ContrastLimit::Nodes(error) };
     (error > tolerance).then_some(limit)
 }
 
@@ -179,10 +166,8 @@ fn refine(
     values.par_iter_mut().zip(frequencies).try_for_each(better)
 }
 
-/// The tolerance of contrast on a second sphere, and the change of contrast above which that on the first
-/// needs no better one.
+/// The least tolerance of contrast on a second sphere.
 const COARSE: f64 = 1e-4;
-const HOPELESS: f64 = 1e-3;
 /// The uncertainty of paths between two spheres, in wavelengths, below which it does not matter.
 const CERTAIN: f64 = 1e-3;
 

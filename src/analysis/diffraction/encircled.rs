@@ -229,7 +229,7 @@ impl PupilFunction {
     /// contrast has corners at `1 − ε`, `1 ± ε` halved and `ε` of it for a round shadow of the share ε.
     /// All circles share the frequencies, which the largest one asks for. With each share comes the error
     /// that those of the contrasts leave in it.
-    pub fn round_encircled(
+    pub(super) fn round_encircled(
         &self,
         radii: &[f64],
         cutoff: f64,

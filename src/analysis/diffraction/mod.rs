@@ -31,6 +31,7 @@ mod pupil_samples;
 mod pupil_traces;
 mod ray_pupil;
 mod ray_transfer;
+mod round_pupil;
 mod strehl;
 
 /// A test that is asked often whether a computation is to end early.
@@ -51,4 +52,5 @@ pub use point_spread::{PointSpread, point_spread, point_spread_unless};
 pub use pupil_function::PupilFunction;
 pub use pupil_samples::PupilSamples;
 pub use ray_transfer::{RayTransfer, TransferAtFrequency, TransferRays};
+pub use round_pupil::RoundPupil;
 pub use strehl::{Strehl, strehl, strehl_unless};

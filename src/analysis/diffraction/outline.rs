@@ -89,6 +89,15 @@ impl PupilCurve {
         Some(Self::from_arcs(&[arc(a, b)?, arc(b, a)?]))
     }
 
+    /// A regular polygon about the origin, by the radius and the angle of its first corner, in radians from +x to +y.
+    pub fn regular_polygon(sides: usize, radius: f64, first: f64) -> Self {
+        let corner = |i: usize| {
+            let (sin, cos) = (first + std::f64::consts::TAU * i as f64 / sides as f64).sin_cos();
+            [radius * cos, radius * sin]
+        };
+        Self::polygon(&(0..sides).map(corner).collect::<Vec<_>>())
+    }
+
     /// A polygon with these corners.
     pub fn polygon(corners: &[[f64; 2]]) -> Self {
         let side = |i: usize| (vec![corners[i], corners[(i + 1) % corners.len()]], true);

@@ -138,6 +138,7 @@ impl TextLines for MtfJson {
                     let reached = not_reached_text(curve.limit);
                     let rays = counted(curve.rays, "ray");
                     lines.push(format!("{name}: {rays}, {milliseconds:.3} ms{reached}"));
+                    lines.extend(sphere_text(curve.sphere));
                     lines.push(column_heads("cycles/mm"));
                     lines.extend(curve.points.iter().map(point_text));
                 }
@@ -199,6 +200,12 @@ fn gate_text(gate: &DiffractionGate) -> String {
         },
     );
     format!("diffraction {state}: {reason}; allowed {tolerance:.0e}")
+}
+
+/// The line about what the choice of the reference sphere leaves, if that is something.
+fn sphere_text(left: f64) -> Option<String> {
+    let text = "  of the errors, the choice of the reference sphere leaves up to";
+    (left > 0.0).then(|| format!("{text} {left:.1e}, whatever the tolerance"))
 }
 
 /// The heads of the columns of a curve.

@@ -7,7 +7,7 @@ use crate::analysis::{
 use crate::cli::output::ShortNumber;
 use crate::lens::FieldPoint;
 use crate::measure::time_ms;
-use crate::picture::{Pattern, PictureError, Scene, SceneLayer};
+use crate::picture::Scene;
 use crate::pupil::RayModel;
 use crate::trace::Ray;
 use serde::Serialize;
@@ -36,26 +36,6 @@ struct PointLight {
     irradiance: Option<Estimate>,
     #[serde(skip_serializing_if = "Option::is_none")]
     refused: Option<String>,
-}
-
-/// The contrast of a wave.
-const WAVE_CONTRAST: f64 = 0.5;
-
-/// The scene of a wave by its two frequencies and its phase: on a plane at a distance in mm, or by the
-/// tangents of the direction of light.
-///
-/// # Errors
-/// A plane that is not in front of the lens.
-pub(super) fn wave_scene(
-    [fx, fy, phase]: [f64; 3],
-    distance: Option<f64>,
-) -> Result<Scene, PictureError> {
-    // Light comes from the opposite side of where it goes.
-    let frequency = if distance.is_some() { [fx, fy] } else { [-fx, -fy] };
-    let pattern = Pattern::Wave { contrast: WAVE_CONTRAST, frequency, phase };
-    let half_size = [f64::INFINITY; 2];
-    let layer = SceneLayer { distance, center: [0.0; 2], half_size, velocity: [0.0; 2], pattern };
-    Scene::new(vec![layer], [0.0; 3], 1.0)
 }
 
 /// The irradiance at the points that were asked for, of a scene or of radiance 1 everywhere.

@@ -34,6 +34,7 @@ use crate::effects::{self, Effect, EffectPlan, TracePurpose};
 use crate::files;
 use crate::lens::{FieldKind, FieldPoint, SurfaceNumber};
 use crate::measure::time_ms;
+use crate::picture::Scene;
 use crate::plot::CurveChart;
 use crate::pupil::{Accuracy, RayModel};
 use crate::trace::{Fate, Fates};
@@ -398,7 +399,7 @@ impl AnalyzeArgs {
         &self,
         run: &AnalysisRun,
     ) -> Result<Vec<AtField<illumination::IlluminationJson>>, CliError> {
-        let wave = self.wave.map(|wave| illumination::wave_scene(wave, self.distance));
+        let wave = self.wave.map(|wave| Scene::wave(wave, self.distance));
         let is_far = self.distance.is_none_or(|distance| distance > 0.0);
         let option = if is_far { "--wave" } else { "--distance" };
         let scene = wave.transpose().map_err(|why| CliError::Input(format!("{option}: {why}")))?;

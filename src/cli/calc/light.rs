@@ -3,9 +3,10 @@
 use super::check;
 use crate::cli::error::CliError;
 use crate::cli::output::{Output, ShortNumber};
-use crate::picture::{SensorModel, black_body_photons, photons_of_wavelength};
+use crate::picture::{
+    SensorModel, black_body_photons, photons_of_wavelength, smear_contrast, thin_lens_blur,
+};
 use serde::Serialize;
-use std::f64::consts::PI;
 use std::fmt::{self, Display};
 
 /// Photons that an illuminance brings to a pixel
@@ -187,13 +188,12 @@ impl NoiseArgs {
         };
         sensor.check().map_err(|error| CliError::Input(error.to_string()))?;
         let [mean, variance] = sensor.exact_moments(self.photons, self.dark);
-        let electrons = self.quantum_efficiency * self.photons + self.dark;
-        let ideal = self.gain.powi(2) * (self.read_noise.powi(2) + electrons) + 1.0 / 12.0;
+        let [ideal_mean, ideal_variance] = sensor.linear_moments(self.photons, self.dark);
         let numbers = [
             ("mean", mean),
             ("variance", variance),
-            ("ideal_mean", self.gain * electrons + self.black_level),
-            ("ideal_variance", ideal),
+            ("ideal_mean", ideal_mean),
+            ("ideal_variance", ideal_variance),
             ("ideal_snr", sensor.signal_to_noise(self.photons, self.dark)),
         ];
         Numbers::print(output, numbers)
@@ -203,8 +203,7 @@ impl NoiseArgs {
 impl SmearArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         check(&[not_negative("--way", self.way), not_negative("--frequency", self.frequency)])?;
-        let phase = PI * self.way * self.frequency;
-        let factor = if phase == 0.0 { 1.0 } else { phase.sin() / phase };
+        let factor = smear_contrast(self.way, self.frequency);
         Numbers::print(output, [("factor", factor)])
     }
 }
@@ -218,9 +217,8 @@ impl BlurArgs {
             ("--focus", self.focus, beyond(self.focus), "more than the focal length"),
             ("--object", self.object, beyond(self.object), "more than the focal length"),
         ])?;
-        let image = |distance: f64| self.focal_length * distance / (distance - self.focal_length);
-        let [sharp, own] = [self.focus, self.object].map(image);
-        let diameter = self.focal_length / self.f_number * (own - sharp).abs() / own;
+        let [sharp, diameter] =
+            thin_lens_blur(self.focal_length, self.f_number, self.focus, self.object);
         Numbers::print(output, [("image_distance", sharp), ("blur_diameter", diameter)])
     }
 }

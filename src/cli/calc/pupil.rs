@@ -1,14 +1,11 @@
 //! `calc pupil`: diffraction at a pupil that is given by its shape and its aberrations.
 
 use super::check;
-use crate::analysis::{
-    AnalysisError, PupilCurve, PupilFunction, PupilSamples, ZernikeIndex, ZernikeOrder,
-};
+use crate::analysis::{AnalysisError, PupilCurve, PupilFunction, PupilSamples, RoundPupil};
 use crate::cli::analyze::parse_point;
 use crate::cli::error::CliError;
 use crate::cli::output::{Output, ShortNumber};
 use serde::Serialize;
-use std::f64::consts::TAU;
 use std::fmt::{self, Display};
 
 /// Point spread, encircled energy and contrast of a pupil of a given shape and aberrations
@@ -75,50 +72,6 @@ fn parse_term(text: &str) -> Result<(String, f64), String> {
     pair.ok_or_else(|| "expected a name and wavelengths, as in `W040=0.5`".to_owned())
 }
 
-/// The aberrations of a round pupil.
-struct Aberrations {
-    seidel: [f64; 5],
-    noll: Vec<(ZernikeIndex, f64)>,
-}
-
-const SEIDEL: [&str; 5] = ["W020", "W040", "W111", "W131", "W222"];
-/// The number of Zernike polynomials.
-const NOLL: usize = 45;
-
-impl Aberrations {
-    fn new(args: &PupilArgs) -> Result<Self, CliError> {
-        let mut seidel = [0.0; 5];
-        for (name, waves) in &args.seidel {
-            let Some(i) = SEIDEL.iter().position(|known| known == name) else {
-                let text = format!("--seidel: no `{name}`; expected one of {}", SEIDEL.join(", "));
-                return Err(CliError::Input(text));
-            };
-            seidel[i] += waves;
-        }
-        let indices = ZernikeOrder::Noll.indices(NOLL);
-        let term = |(name, waves): &(String, f64)| {
-            let number = name.parse::<usize>().ok().filter(|j| (1..=NOLL).contains(j));
-            let text = || format!("--noll: found `{name}`; expected a number from 1 to {NOLL}");
-            number.map(|j| (indices[j - 1], *waves)).ok_or_else(|| CliError::Input(text()))
-        };
-        let noll: Result<Vec<_>, CliError> = args.noll.iter().map(term).collect();
-        Ok(Self { seidel, noll: noll? })
-    }
-
-    /// The path difference at a point of the unit disc, in wavelengths.
-    fn waves(&self, [x, y]: [f64; 2]) -> f64 {
-        let square = x * x + y * y;
-        let forms = [square, square * square, y, square * y, y * y];
-        let seidel: f64 = self.seidel.iter().zip(forms).map(|(w, form)| w * form).sum();
-        seidel + self.noll.iter().map(|(z, w)| w * z.value([x, y])).sum::<f64>()
-    }
-
-    fn is_round(&self) -> bool {
-        let seidel = self.seidel[2..].iter().all(|w| *w == 0.0);
-        seidel && self.noll.iter().all(|(z, _)| z.frequency == 0)
-    }
-}
-
 /// The printed result.
 #[derive(Serialize)]
 struct PupilReport {
@@ -173,13 +126,30 @@ impl PupilArgs {
         if let Some(wrong) = self.radii.iter().find(|r| !is_positive(**r)) {
             return Err(CliError::Input(format!("--radius: found {wrong}; expected more than 0")));
         }
-        let (pupil, is_round) = self.pupil()?;
-        output.print(&self.report(&pupil, is_round))
+        let (pupil, round) = self.pupil()?;
+        output.print(&self.report(&pupil, round.as_ref()))
     }
 
-    /// The pupil, and whether it is round with what it does to light.
-    fn pupil(&self) -> Result<(PupilFunction, bool), CliError> {
-        let aberrations = Aberrations::new(self)?;
+    /// The round pupil that the options describe.
+    fn round(&self) -> Result<RoundPupil, CliError> {
+        let mut round = RoundPupil::new(self.um, self.f_number, self.obscuration);
+        for (name, waves) in &self.seidel {
+            let known = RoundPupil::SEIDEL.join(", ");
+            let text = || format!("--seidel: no `{name}`; expected one of {known}");
+            round.add_seidel(name, *waves).ok_or_else(|| CliError::Input(text()))?;
+        }
+        for (name, waves) in &self.noll {
+            let most = RoundPupil::NOLL;
+            let text = || format!("--noll: found `{name}`; expected a number from 1 to {most}");
+            let added = name.parse().ok().and_then(|number| round.add_noll(number, *waves));
+            added.ok_or_else(|| CliError::Input(text()))?;
+        }
+        Ok(round)
+    }
+
+    /// The pupil, and the round one that it is with what it does to light, if it is.
+    fn pupil(&self) -> Result<(PupilFunction, Option<RoundPupil>), CliError> {
+        let round = self.round()?;
         let clear = self.seidel.is_empty() && self.noll.is_empty() && self.obscuration == 0.0;
         let pieces = self.pieces()?;
         if let Some(pieces) = pieces {
@@ -189,18 +159,10 @@ impl PupilArgs {
                 return Err(CliError::Input(text.to_owned()));
             }
             let pupil = PupilFunction::uniform(pieces, self.um, |_| 0.0).map_err(refuse)?;
-            return Ok((pupil, false));
+            return Ok((pupil, None));
         }
-        let radius = 0.5 / self.f_number;
-        // The image is real: a ray through +y goes down.
-        let waves = |c: [f64; 2]| aberrations.waves(c.map(|v| -v / radius));
-        let circle = |share: f64| PupilCurve::circle([0.0; 2], share * radius);
-        let pupil = if self.obscuration > 0.0 {
-            PupilFunction::ring(&[circle(1.0), circle(self.obscuration)], self.um, waves)
-        } else {
-            PupilFunction::uniform(vec![circle(1.0)], self.um, waves)
-        };
-        Ok((pupil.map_err(refuse)?, aberrations.is_round()))
+        let pupil = round.function().map_err(refuse)?;
+        Ok((pupil, round.has_round_aberrations().then_some(round)))
     }
 
     /// The curves of a pupil that is not round.
@@ -219,12 +181,8 @@ impl PupilArgs {
                 let text = "--polygon: expected 3 to 100 sides and a positive radius";
                 return Err(CliError::Input(text.to_owned()));
             }
-            let corner = |i: usize| {
-                let (sin, cos) = (degrees.to_radians() + TAU * i as f64 / sides).sin_cos();
-                [radius * cos, radius * sin]
-            };
-            let corners: Vec<_> = (0..sides as usize).map(corner).collect();
-            return Ok(Some(vec![PupilCurve::polygon(&corners)]));
+            let first = degrees.to_radians();
+            return Ok(Some(vec![PupilCurve::regular_polygon(sides as usize, radius, first)]));
         }
         if self.common {
             let found = match self.discs[..] {
@@ -239,7 +197,7 @@ impl PupilArgs {
         Ok((!self.discs.is_empty()).then(|| self.discs.iter().map(disc).collect()))
     }
 
-    fn report(&self, pupil: &PupilFunction, is_round: bool) -> PupilReport {
+    fn report(&self, pupil: &PupilFunction, round: Option<&RoundPupil>) -> PupilReport {
         let [few, many] = ORDERS.map(|order| pupil.samples(order));
         let point = |at: &[f64; 2]| {
             let [before, intensity] = [few.intensity(*at), many.intensity(*at)];
@@ -250,7 +208,10 @@ impl PupilArgs {
             let error = found.modulus.error;
             PupilTransfer { nx: nu[0], ny: nu[1], re: found.re, im: found.im, error }
         };
-        let circles = if is_round { self.round_circles(pupil) } else { self.circles(pupil) };
+        let circles = match round {
+            Some(round) => self.round_circles(round, pupil),
+            None => self.circles(pupil),
+        };
         PupilReport {
             strehl: many.intensity([0.0; 2]),
             points: self.points.iter().map(point).collect(),
@@ -260,10 +221,8 @@ impl PupilArgs {
     }
 
     /// The energy within circles about the centre of the image of a round pupil, by its contrast.
-    fn round_circles(&self, pupil: &PupilFunction) -> Vec<PupilCircle> {
-        let cutoff = 1e3 / (self.um * self.f_number);
-        let [few, many] = [false, true]
-            .map(|fine| pupil.round_encircled(&self.radii, cutoff, self.obscuration, fine));
+    fn round_circles(&self, round: &RoundPupil, pupil: &PupilFunction) -> Vec<PupilCircle> {
+        let [few, many] = [false, true].map(|fine| round.encircled(pupil, &self.radii, fine));
         let energies = few.into_iter().zip(many).zip(&self.radii);
         let circle = |(([before, _], [energy, left]), radius): (([f64; 2], [f64; 2]), &f64)| {
             PupilCircle { radius: *radius, energy, error: (energy - before).abs() + left }

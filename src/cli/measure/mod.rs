@@ -5,6 +5,7 @@ mod design;
 mod glasses;
 mod gradient;
 mod grin;
+mod images;
 mod limits;
 mod minima;
 mod mtf;
@@ -39,6 +40,7 @@ enum BenchmarkCommand {
     Psf(psf::MeasurePsfArgs),
     Gradient(gradient::MeasureGradientArgs),
     Picture(picture::MeasurePictureArgs),
+    Images(images::MeasureImagesArgs),
     Grin(grin::MeasureGrinArgs),
     Optimize(optimize::MeasureOptimizeArgs),
     Limits(limits::MeasureLimitsArgs),
@@ -59,6 +61,7 @@ impl MeasureArgs {
             BenchmarkCommand::Psf(psf) => psf.run(output),
             BenchmarkCommand::Gradient(gradient) => gradient.run(output),
             BenchmarkCommand::Picture(picture) => picture.run(output),
+            BenchmarkCommand::Images(images) => images.run(output),
             BenchmarkCommand::Grin(grin) => grin.run(output),
             BenchmarkCommand::Optimize(optimize) => optimize.run(output),
             BenchmarkCommand::Limits(limits) => limits.run(output),

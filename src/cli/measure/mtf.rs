@@ -145,7 +145,8 @@ impl Display for MeasureMtfReport {
                  {colors} colours, one core; pupils found in {:.2} ms",
                 curves.pupils_ms
             )?;
-            let mut table = TextTable::new(&["", "tolerance", "error", "stated", "rays", "ms", ""]);
+            let mut table =
+                TextTable::new(&["", "tolerance", "error", "stated", "sphere", "rays", "ms", ""]);
             curves.rows.iter().for_each(|row| table.row(cells(row)));
             let others = optiland.iter().flat_map(|found| &found.rows);
             others.for_each(|row| table.row(optiland_cells(row)));
@@ -168,6 +169,7 @@ fn optiland_cells(row: &OptilandRow) -> Vec<String> {
         String::new(),
         format!("{:.1e}", row.error),
         String::new(),
+        String::new(),
         format!("{0} x {0}", row.rays),
         format!("{:.2}", row.ms),
         String::new(),
@@ -180,6 +182,7 @@ fn cells(row: &TransferRow) -> Vec<String> {
         format!("{:.0e}", row.tolerance),
         format!("{:.1e}", row.error),
         format!("{:.1e}", row.stated),
+        if row.sphere > 0.0 { format!("{:.1e}", row.sphere) } else { String::new() },
         row.rays.to_string(),
         format!("{:.2}", row.ms),
         row.limit.map_or_else(String::new, |limit| limit.to_string()),

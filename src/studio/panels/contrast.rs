@@ -268,8 +268,11 @@ fn numbers(ui: &mut Ui, contrast: &FieldContrast, ms: f64) {
     }
     let error = plain_error(error, "");
     let rays = format!("{error}, {} rays, {ms:.1} ms", curve.rays);
-    ui.label(RichText::new(rays).small().weak())
-        .on_hover_text("The largest error of the curves, the rays traced for them, and the time");
+    let hover = "The largest error of the curves, the rays traced for them, and the time";
+    ui.label(RichText::new(rays).small().weak()).on_hover_text(match curve.sphere {
+        0.0 => hover.to_owned(),
+        left => format!("{hover}. The choice of the reference sphere leaves {left:.1e} of it"),
+    });
     if let Some(why) = contrast.without_diffraction {
         let text = RichText::new("rays alone").small().color(ui.visuals().warn_fg_color);
         ui.label(text).on_hover_text(why.to_string());

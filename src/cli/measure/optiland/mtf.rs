@@ -138,6 +138,7 @@ mod tests {
             re: modulus,
             im: 0.0,
             modulus: Estimate::new(modulus, 0.0, 1),
+            sphere: 0.0,
         };
         let point = MtfPoint { frequency: 1.0, tangential: value(0.5), sagittal: value(0.75) };
         let curve = MtfCurve {
@@ -145,6 +146,7 @@ mod tests {
             origin: [0.0; 2],
             reached: true,
             limit: None,
+            sphere: 0.0,
             rays: 1,
             dark_share: 0.0,
         };
