@@ -20,6 +20,8 @@ pub struct ExperimentOutcome {
     pub lenses: Vec<(String, Lens)>,
     /// The number of rays traced.
     pub rays: usize,
+    /// What the figure shows and the numbers do not, and why claims fail; as sentences.
+    pub reasons: Vec<String>,
 }
 
 impl ExperimentOutcome {

@@ -79,15 +79,14 @@ fn contrast_of_strong_aberrations_is_within_its_stated_error() {
             for tolerance in [1e-2, 1e-3, 1e-4] {
                 let found = at(tolerance);
                 let (mut worst, mut stated) = (Worst::default(), 0.0f64);
-                for (found, exact) in found.points.iter().zip(&exact.points) {
-                    let pairs =
-                        [(found.tangential, exact.tangential), (found.sagittal, exact.sagittal)];
-                    for (a, b) in pairs {
-                        let error = a.numerical_error() + b.numerical_error();
-                        stated = stated.max(a.numerical_error());
-                        let off = (a.re - b.re).hypot(a.im - b.im);
-                        worst.note(off, 0.0, error, format!("{a:?}"));
-                    }
+                let pairs = found.points.iter().zip(&exact.points).flat_map(|(found, exact)| {
+                    [(found.tangential, exact.tangential), (found.sagittal, exact.sagittal)]
+                });
+                for (a, b) in pairs {
+                    let error = a.numerical_error() + b.numerical_error();
+                    stated = stated.max(a.numerical_error());
+                    let off = (a.re - b.re).hypot(a.im - b.im);
+                    worst.note(off, 0.0, error, format!("{a:?}"));
                 }
                 assert_eq!(found.reached, stated <= tolerance, "{name} {share} {stated:e}");
                 let sphere = found.sphere;

@@ -49,6 +49,11 @@ pub(super) fn first_order(file: &ImageEntry<'_>, answers: &mut Answers) -> Done 
     Ok(())
 }
 
+/// The difference of an answer from none: without an end if there is one.
+fn difference_from_none<T, E>(found: &Result<T, E>) -> f64 {
+    if found.is_ok() { f64::INFINITY } else { 0.0 }
+}
+
 pub(super) fn paths(file: &ImageEntry<'_>, answers: &mut Answers) -> Done {
     for lens in lenses(file)? {
         // No rim clips the rays of the table.
@@ -71,8 +76,7 @@ pub(super) fn paths(file: &ImageEntry<'_>, answers: &mut Answers) -> Done {
             }
             for (found, ray) in found.into_iter().zip(&rays) {
                 if ray.get("waves").is_null() {
-                    let none = if found.is_ok() { f64::INFINITY } else { 0.0 };
-                    answers.note(none, 0.0, WAVES, &ray.place);
+                    answers.note(difference_from_none(&found), 0.0, WAVES, &ray.place);
                     continue;
                 }
                 let Some(path) = answers.accept(found, &ray.place) else { continue };
