@@ -178,6 +178,9 @@ fn outline_half(region: &Region<'_>, steps: usize) -> Vec<[f64; 2]> {
     (0..=steps).filter_map(at).collect()
 }
 
+/// The error of a ray of a picture behind a gap with a GRIN medium, as a part of the length of the gap.
+const PICTURE_GRIN: f64 = 1e-7;
+
 /// A lens traced backwards at one wavelength, from points of its image to the rays of the scene that
 /// arrive there.
 #[derive(Debug, Clone)]
@@ -198,12 +201,30 @@ impl BackwardLens {
     /// # Errors
     /// Numbers that cannot be traced.
     pub fn new(model: &RayModel, wavelength: usize) -> Result<Self, SystemError> {
+        Self::with_tracer(model, wavelength, Tracer::new)
+    }
+
+    /// The same for pictures: rays through GRIN media may be wrong by a ten-millionth of a gap, far less than a
+    /// pixel, which takes a part of the steps.
+    ///
+    /// # Errors
+    /// Numbers that cannot be traced.
+    pub fn for_picture(model: &RayModel, wavelength: usize) -> Result<Self, SystemError> {
+        let prepare = |system: &_| Tracer::with_grin_tolerance(system, PICTURE_GRIN);
+        Self::with_tracer(model, wavelength, prepare)
+    }
+
+    fn with_tracer(
+        model: &RayModel,
+        wavelength: usize,
+        prepare: impl Fn(&System<f64>) -> Result<Tracer<f64>, SystemError>,
+    ) -> Result<Self, SystemError> {
         let limited = limited(model)?;
         let system = &limited.channels[wavelength].system;
         let [.., last, image] = &system.surfaces[..] else { return Err(SystemError::NoSurfaces) };
         let (reversed, radius) = surrounded(system);
         Ok(Self {
-            tracer: Tracer::new(&reversed)?,
+            tracer: prepare(&reversed)?,
             image: image.clone(),
             back: last.thickness,
             turn: turn(system),

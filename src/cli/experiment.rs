@@ -268,7 +268,9 @@ impl Display for ExperimentReport {
         for claim in &outcome.claims {
             table.row(cells(claim));
         }
-        writeln!(f, "{table}\n{} rays, {ms:.0} ms", outcome.rays)?;
+        writeln!(f, "{table}")?;
+        outcome.reasons.iter().try_for_each(|reason| writeln!(f, "{reason}.\n"))?;
+        writeln!(f, "{} rays, {ms:.0} ms", outcome.rays)?;
         for PhaseTiming { doing, ms, processor_ms } in &self.parts {
             write!(f, "{:9.2} s", 1e-3 * ms)?;
             if let Some(ms) = processor_ms {

@@ -68,6 +68,7 @@ fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
             ("brightest".to_owned(), study.shots[1].design.lens.clone()),
         ],
         rays: study.shots.iter().map(CandleShot::rays).sum(),
+        reasons: Vec::new(),
     })
 }
 

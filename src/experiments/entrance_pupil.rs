@@ -62,6 +62,7 @@ fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
             NamedPlot { name: "shares", canvas: curves(&model, &pupils) },
         ],
         rays: pupils.iter().map(|pupil| pupil.rays).sum(),
+        reasons: Vec::new(),
     })
 }
 

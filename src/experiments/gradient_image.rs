@@ -78,6 +78,7 @@ fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
         lenses: Vec::new(),
         pictures: vec![NamedPlot { name: "images", canvas: images.draw() }],
         rays: images.pixels.iter().map(|pixel| pixel.rays).sum(),
+        reasons: Vec::new(),
     })
 }
 

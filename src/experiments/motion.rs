@@ -80,6 +80,7 @@ fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
             ("brightest".to_owned(), pair.bright.design.lens.clone()),
         ],
         rays,
+        reasons: Vec::new(),
     })
 }
 

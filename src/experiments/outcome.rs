@@ -20,6 +20,8 @@ pub struct ExperimentOutcome {
     pub lenses: Vec<(String, Lens)>,
     /// The number of rays traced.
     pub rays: usize,
+    /// Sentences: what the figure shows, and the reasons why claims fail.
+    pub reasons: Vec<String>,
 }
 
 impl ExperimentOutcome {

@@ -70,6 +70,7 @@ fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
             ("unbiased".to_owned(), pair[1].lens.clone()),
         ],
         rays,
+        reasons: Vec::new(),
     })
 }
 

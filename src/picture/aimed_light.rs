@@ -95,7 +95,7 @@ impl AberratedLens<'_> {
     pub(super) fn spreads(&self, reach: f64, margin: f64) -> Option<PupilSpreads> {
         let aimed = AimedLight::new(self.model, self.bands, reach)?;
         let wavelengths = wavelengths(self.bands);
-        let lens = |w: &usize| BackwardLens::new(self.model, *w).ok();
+        let lens = |w: &usize| BackwardLens::for_picture(self.model, *w).ok();
         let lenses = wavelengths.iter().map(lens).collect::<Option<Vec<BackwardLens>>>()?;
         let one = |i: usize| {
             let (set, knot) = (i / KNOTS, i % KNOTS);

@@ -196,7 +196,7 @@ impl BeamletTable {
     ) -> Result<Vec<Self>, PictureError> {
         let lenses = |band: &ColorBand| {
             let lens = |(wavelength, share): &(usize, f64)| {
-                Ok((*share, BackwardLens::new(model, *wavelength)?))
+                Ok((*share, BackwardLens::for_picture(model, *wavelength)?))
             };
             band.wavelengths.iter().map(lens).collect::<Result<Vec<_>, PictureError>>()
         };
@@ -235,7 +235,7 @@ impl BeamletTable {
     ) -> Result<Self, PictureError> {
         let lenses = |band: &ColorBand| {
             let lens = |(wavelength, share): &(usize, f64)| {
-                Ok((*share, BackwardLens::new(model, *wavelength)?))
+                Ok((*share, BackwardLens::for_picture(model, *wavelength)?))
             };
             band.wavelengths.iter().map(lens).collect::<Result<Vec<_>, PictureError>>()
         };

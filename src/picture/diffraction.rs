@@ -172,7 +172,7 @@ fn unaberrated(
     if !unit.is_finite() {
         return Ok(None);
     }
-    let lens = BackwardLens::new(model, model.primary)?;
+    let lens = BackwardLens::for_picture(model, model.primary)?;
     let all = |factor: f64| {
         let margin = factor * unit;
         let directions = LitDirections::new(model, wavelengths, reach + margin, RINGS).ok()?;

@@ -105,7 +105,7 @@ impl LightLosses<'_> {
         let um = model.channels[wavelength].um;
         let coated = CoatedLens::new(model, wavelength, self.coating)?;
         let coated = coated.with_absorption(|surface| self.absorbance(surface, um));
-        Ok(ColorLens { rays: BackwardLens::new(model, wavelength)?, coated })
+        Ok(ColorLens { rays: BackwardLens::for_picture(model, wavelength)?, coated })
     }
 
     /// The share of light on the axis that the glasses absorb at a wavelength.

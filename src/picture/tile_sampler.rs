@@ -149,7 +149,8 @@ impl TileSampler {
         directions: LitDirections,
     ) -> Result<Self, PictureError> {
         let of_band = |band: &ColorBand| {
-            let lens = |(wavelength, _): &(usize, f64)| Ok(BackwardLens::new(model, *wavelength)?);
+            let lens =
+                |(wavelength, _): &(usize, f64)| Ok(BackwardLens::for_picture(model, *wavelength)?);
             band.wavelengths.iter().map(lens).collect::<Result<Vec<_>, PictureError>>()
         };
         let lenses = bands.iter().map(of_band).collect::<Result<_, _>>()?;

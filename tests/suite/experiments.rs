@@ -216,6 +216,9 @@ fn finer_fields_form_sharper_images() {
     let tricubic = rows_with(&outcome.tables[0], "field", "tricubic");
     let quality = column(&tricubic, "quality_db");
     assert!(quality.windows(2).all(|pair| pair[1] > pair[0]), "{quality:?}");
+    let loss = column(&outcome.tables[0], "loss_quality_db");
+    assert!(loss.len() == 6 && loss.iter().all(|quality| *quality > 5.0), "{loss:?}");
+    assert!(outcome.reasons.is_empty(), "every gain is reached: {:?}", outcome.reasons);
 }
 
 #[test]

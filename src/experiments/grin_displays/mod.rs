@@ -78,7 +78,9 @@ struct EvaluatedField {
 struct EvaluatedView {
     name: String,
     picture: ProjectedView,
-    /// The same image by other samples.
+    /// The peak signal to noise in dB of the image of the loss, in which each ray is spread over nine pixels.
+    loss_quality: Option<f64>,
+    /// The image by light on its pixels, by other samples.
     again: ProjectedImage,
     /// The largest change of an exit when the step is halved, in mm, and the rays that tell it.
     tracing_error: Option<f64>,
@@ -138,7 +140,8 @@ fn evaluate(
         let (picture, again): (ProjectedView, _) = picture.zip(again)?;
         let (name, again) = (view.name.clone(), again.light);
         let (tracing_error, tracing_rays) = (report.error, report.result.counts.fates.total());
-        Some(EvaluatedView { name, picture, again, tracing_error, tracing_rays })
+        let loss_quality = report.result.psnr;
+        Some(EvaluatedView { name, picture, loss_quality, again, tracing_error, tracing_rays })
     };
     let views: Vec<EvaluatedView> = both.filter_map(view).collect();
     // An image that was ended early is none.

@@ -12,8 +12,6 @@ use crate::math::{Real, Vec3};
 use crate::trace::interface::Interface;
 use serde::Serialize;
 
-/// The permitted error of a ray behind a gap, as a part of the length of the gap.
-const TOLERANCE: f64 = 1e-11;
 /// The largest number of steps that is tried.
 const MAX_STEPS: u32 = 4096;
 /// The permitted length of a ray, as a multiple of the length on the axis.
@@ -38,7 +36,8 @@ pub struct GrinStepPlan {
 }
 
 impl<R: Real> GrinGap<R> {
-    /// Prepares a gap between two surfaces; `number` is the index of the first one.
+    /// Prepares a gap between two surfaces; `number` is the index of the first one, and `tolerance` the permitted
+    /// error of a ray behind the gap as a part of its length.
     ///
     /// # Errors
     /// A GRIN medium that is too strong for any number of steps.
@@ -46,13 +45,14 @@ impl<R: Real> GrinGap<R> {
         field: RotationalProfile<R>,
         number: usize,
         faces: [&Interface<R>; 2],
+        tolerance: f64,
     ) -> Result<(Self, GrinStepPlan), SystemError> {
         let side2 = R::select(faces[0].rim2 > faces[1].rim2, faces[0].rim2, faces[1].rim2);
         let plain = RotationalProfile {
             base: field.base.value(),
             coefficients: field.coefficients.map(Real::value),
         };
-        let plan = choose_steps(&plain, number, &faces.map(Interface::value))?;
+        let plan = choose_steps(&plain, (number, tolerance), &faces.map(Interface::value))?;
         let gap = Self {
             field,
             ops: INTEGRATOR.ops(),
@@ -67,7 +67,7 @@ impl<R: Real> GrinGap<R> {
 /// Tries powers of two as the number of steps.
 fn choose_steps(
     field: &RotationalProfile<f64>,
-    surface: usize,
+    (surface, tolerance): (usize, f64),
     faces: &[Interface<f64>; 2],
 ) -> Result<GrinStepPlan, SystemError> {
     let reach = trial_radius(field, faces[1].gap.abs());
@@ -81,7 +81,7 @@ fn choose_steps(
         side2: f64::INFINITY,
     };
     let starts = trial_rays(field, &faces[0], reach, faces[1].sense);
-    let allowed = TOLERANCE * length;
+    let allowed = tolerance * length;
     let mut steps = min_steps(field, reach, whole);
     let mut error = f64::INFINITY;
     while steps <= MAX_STEPS {
