@@ -24,8 +24,8 @@ pub struct TransferValue {
     /// The modulus: the contrast; its error is that of the complex number, the share of the reference sphere
     /// included.
     pub modulus: Estimate,
-    /// What the choice of the reference sphere leaves uncertain, a part of that error: the change on doubling its
-    /// radius. No computation makes it less. 0 for contrast by rays.
+    /// The part of that error by the choice of the reference sphere: the change on doubling its radius. No
+    /// computation makes it less. 0 for contrast by rays.
     pub sphere: f64,
 }
 

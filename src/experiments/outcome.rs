@@ -20,7 +20,7 @@ pub struct ExperimentOutcome {
     pub lenses: Vec<(String, Lens)>,
     /// The number of rays traced.
     pub rays: usize,
-    /// What the figure shows and the numbers do not, and why claims fail; as sentences.
+    /// Sentences: what the figure shows, and the reasons why claims fail.
     pub reasons: Vec<String>,
 }
 

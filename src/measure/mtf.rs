@@ -49,7 +49,8 @@ pub struct TransferRow {
     pub tolerance: f64,
     /// The largest error estimate, without what the reference sphere leaves.
     pub stated: f64,
-    /// What the choice of the reference sphere leaves at most; charts on the same sphere do not differ by it.
+    /// The largest part of an error by the choice of the reference sphere; charts on the same sphere do not differ by
+    /// it.
     pub sphere: f64,
     /// The largest difference from the reference.
     pub error: f64,

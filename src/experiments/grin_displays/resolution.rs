@@ -171,7 +171,7 @@ impl QualityGain {
         }
     }
 
-    /// Why it falls short; `None` if it does not.
+    /// The reason why it falls short; `None` if it does not.
     fn reason(&self) -> Option<String> {
         let Self { claim, light, loss } = self;
         let gain = |pair: &[f64; 2]| {
@@ -217,7 +217,7 @@ fn gains(rows: &[ResolutionRow], effort: Effort) -> Vec<QualityGain> {
     gains
 }
 
-/// What the figure shows, if some gains fall short, and why each of them does.
+/// A sentence about what the figure shows, if some gains fall short, and the reason of each.
 fn reasons(gains: &[QualityGain]) -> Vec<String> {
     let short: Vec<String> = gains.iter().filter_map(QualityGain::reason).collect();
     let figure = "The figure of the thesis shows images of volumes of rising resolution and claims that accuracy rises \

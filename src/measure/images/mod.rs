@@ -25,7 +25,7 @@ use std::ops::ControlFlow;
 pub struct ImageAnswers {
     /// The kind.
     pub kind: &'static str,
-    /// How many numbers were compared.
+    /// The count of numbers that were compared.
     pub numbers: usize,
     /// The difference of the worst one from its exact value; `None` if there is no such number.
     pub difference: Option<f64>,
