@@ -309,15 +309,16 @@ fn frequencies(exact: &Value) -> String {
     format!("--frequencies={}", all.join(","))
 }
 
+/// Every other lens: `measure images` compares all of them, with as many rays.
 #[test]
 fn contrast_of_one_wavelength() {
-    for folder in folders("contrast") {
+    for folder in folders("contrast").iter().step_by(2) {
         let mut worst = Worst::default();
         for (exact, lens) in folder.fields().filter(|(exact, _)| !exact["mtf"].is_null()) {
             let asked = [paraxial(), frequencies(&exact["mtf"])];
             let found = folder.analyze(&lens, "mtf", &asked)[0].clone();
             let curves = [&found["diffraction"], &found["geometric"]];
-            compare_contrast(&folder, &exact["mtf"], curves, true, &mut worst);
+            compare_contrast(folder, &exact["mtf"], curves, true, &mut worst);
         }
         worst.check(&format!("contrast {}", folder.id()), 1.0);
     }
