@@ -14,8 +14,8 @@ use crate::merit::{
 use crate::optimize::{DescentMethod, start};
 use crate::tolerance::{
     Compensation, Derivatives, ErrorModel, FocusTreatment, NominalLens, QuadraticForm, RayEffects,
-    SecondDerivatives, ToleranceError, ToleranceRequest, ToleranceScene, analyze, form_spots,
-    graded_sheet, perturb, sensitivities, traced_lenses,
+    SecondDerivatives, Sensitivity, ToleranceError, ToleranceRequest, ToleranceScene, analyze,
+    form_spots, graded_sheet, perturb, sensitivities, traced_lenses,
 };
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
@@ -138,17 +138,15 @@ pub fn measure_tolerances(
     let real =
         || traced_lenses((&scene, moves), &sheet, (1, samples), &is_stopped).map(|own| own.len());
     let (traced, samples_ms) = two.install(|| time_median(1..=5, real));
-    let pairs = found.iter().zip(&swept.forms[0].first);
-    let first_error = pairs.map(|(jet, swept)| first_difference(jet.mean_square(), *swept));
+    let first_error = first_error(&found, &swept.forms[0], &sheet);
     if is_stopped() {
         return Ok(None);
     }
-    let is_centred = scene.lens.systems.iter().all(|system| !system.has_poses());
-    let poses = is_centred.then(|| pose_cost(&scene, &one)).transpose()?;
+    let poses = pose_cost(&scene, &one)?;
     Ok(Some(ToleranceBenchmark {
         errors: errors.len(),
         rays: scene.beam.rays(),
-        first_error: first_error.fold(0.0, f64::max),
+        first_error,
         second_error: second_error(&scene, &sheet)?,
         sampling_error: sampling_error(lens, &sheet, &swept.forms[0])?,
         moving_pupils: moves,
@@ -172,12 +170,38 @@ fn sampling_error(
 ) -> Result<f64, ToleranceError> {
     let scene = ToleranceScene::new(lens, 0, 1e-2 * ACCURACY)?.with_held_pupils();
     let exact = ErrorModel::new(&scene, sheet, SecondDerivatives::Neglected, &|| false)?;
-    let growth = |form: &QuadraticForm, i: usize| form.second.of(i, i);
-    let apart = (0..sheet.errors.len()).filter_map(|i| {
-        let exact = growth(&exact.forms[0], i);
-        (exact > 0.0).then(|| (growth(found, i) / exact - 1.0).abs())
-    });
+    let [exact, found] = [&exact.forms[0], found].map(|form| growths(form, sheet));
+    let floor = NEGLIGIBLE * exact.iter().sum::<f64>();
+    let apart = exact.iter().zip(&found);
+    let apart = apart.map(|(exact, found)| (found - exact).abs() / exact.abs().max(floor));
     Ok(apart.fold(0.0, f64::max))
+}
+
+/// The largest relative difference of first derivatives by a sweep back from those by jets.
+fn first_error(found: &[Sensitivity], swept: &QuadraticForm, sheet: &ToleranceSheet) -> f64 {
+    let whole = growths(swept, sheet).iter().sum::<f64>();
+    let pairs = found.iter().zip(&swept.first).zip(&sheet.errors);
+    let apart = pairs.map(|((jet, swept), own)| {
+        let jet = jet.mean_square();
+        first_difference(jet, *swept) * share_of(jet, own, whole)
+    });
+    apart.fold(0.0, f64::max)
+}
+
+/// The share of the growth by all errors below which that by one is nothing: an error that moves a plane along
+/// itself, say, of which only rounding is left.
+const NEGLIGIBLE: f64 = 1e-9;
+
+/// The growth of the mean square spot by each error at half of its range, in mm².
+fn growths(form: &QuadraticForm, sheet: &ToleranceSheet) -> Vec<f64> {
+    let growth = |(i, own): (usize, &Tolerance)| form.second.of(i, i) * own.half_range.powi(2);
+    sheet.errors.iter().enumerate().map(growth).collect()
+}
+
+/// 1 for an error that matters beside what all of them do, less for one that does next to nothing.
+fn share_of(exact: Derivatives, own: &Tolerance, whole: f64) -> f64 {
+    let growth = exact.second.abs() * own.half_range.powi(2);
+    (growth / (NEGLIGIBLE * whole).max(f64::MIN_POSITIVE)).sqrt().min(1.0)
 }
 
 /// The difference of a first derivative, relative to the larger of itself and `√|value × second|`.

@@ -89,11 +89,14 @@ pub struct PoseCost {
     pub different: usize,
 }
 
-/// The cost of poses, which a centred lens does not pay.
+/// The cost of poses, which a centred lens does not pay; `None` for a lens that has some.
 pub(super) fn pose_cost(
     scene: &ToleranceScene,
     one: &ThreadPool,
-) -> Result<PoseCost, ToleranceBenchmarkError> {
+) -> Result<Option<PoseCost>, ToleranceBenchmarkError> {
+    if scene.lens.systems.iter().any(System::has_poses) {
+        return Ok(None);
+    }
     let centred = scene.lens.systems[scene.lens.primary].clone();
     let mut moved = centred.clone();
     moved.surfaces.iter_mut().for_each(|surface| surface.pose = Some(Pose::centred()));
@@ -114,7 +117,7 @@ pub(super) fn pose_cost(
             || centred.fate(*i) != moved.fate(*i)
     };
     let different = (0..rays.len()).filter(differs).count();
-    Ok(PoseCost { centred_ns, posed_ns, different })
+    Ok(Some(PoseCost { centred_ns, posed_ns, different }))
 }
 
 /// The time of the derivatives of the wavefront and of the contrast by all errors, on one core, in milliseconds.

@@ -391,8 +391,8 @@ impl ReferenceLens {
             AgreementRow::new("second derivatives", self.bound(1e-7)),
         ];
         for (found, answer) in found.iter().zip(&self.derivatives) {
-            for (found, exact) in answer.pairs(found) {
-                note_derivatives(&mut rows, found, exact);
+            for (found, part, exact) in answer.pairs(found) {
+                note_derivatives(&mut rows, (found, part), exact);
             }
         }
         Ok(rows)
@@ -415,12 +415,12 @@ impl ReferenceLens {
             // The second ones leave out those of rays by two errors.
             let second = answer.mean[1];
             let found = Derivatives { value: form.nominal, first: form.first[i], second };
-            note_derivatives(&mut rows, found, answer.mean);
+            note_derivatives(&mut rows, (found, found), answer.mean);
         }
         Ok(rows[0])
     }
 
-    /// What is expected of lenses that are made: means and quantiles, in standard errors of both.
+    /// Means and quantiles of lenses that are made, in standard errors of both.
     fn expectations(&self, samples: usize) -> Result<AgreementRow, ToleranceError> {
         let mut row = AgreementRow::new("means and quantiles as built, standard errors", 4.0);
         // The rays of the Monte Carlo of the file, and such as its expectations need.
@@ -459,13 +459,21 @@ fn sheet(errors: &[DrawnError], distribution: Option<ErrorDistribution>) -> Tole
     ToleranceSheet::of_errors(errors.iter().map(tolerance).collect())
 }
 
+/// The rounding of a sum, as a share of its terms.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
+
 /// Notes a first derivative relative to the larger of itself and `√|value × second|`, and a second one; what
-/// symmetry makes 0 is rounding.
-fn note_derivatives(rows: &mut [AgreementRow; 2], found: Derivatives, [first, second]: [f64; 2]) {
+/// symmetry makes 0 is rounding, and so is what is left of the terms of a merit, of which one is `part`.
+fn note_derivatives(
+    rows: &mut [AgreementRow; 2],
+    (found, part): (Derivatives, Derivatives),
+    [first, second]: [f64; 2],
+) {
     let floor = 1e-3 * found.value;
     let scale = first.abs().max((found.value * second).abs().sqrt()).max(floor);
-    rows[0].note((found.first - first) / scale);
-    rows[1].note((found.second - second) / second.abs().max(floor));
+    let beyond = |apart: f64, part: f64| (apart.abs() - ROUNDING * part.abs()).max(0.0);
+    rows[0].note(beyond(found.first - first, part.first) / scale);
+    rows[1].note(beyond(found.second - second, part.second) / second.abs().max(floor));
 }
 
 impl PerturbedAnswer {
@@ -475,18 +483,22 @@ impl PerturbedAnswer {
 }
 
 impl ErrorAnswer {
-    /// The derivatives of a lens with their exact values.
-    fn pairs(&self, found: &Sensitivity) -> Vec<(Derivatives, [f64; 2])> {
-        let merits = &found.merits;
-        let mut pairs = vec![
-            (found.mean_square(), self.mean),
-            (found.mean_square_focused(), self.mean_focused),
-        ];
+    /// The derivatives of a lens, those of a part of each, and their exact values.
+    fn pairs(&self, found: &Sensitivity) -> Vec<(Derivatives, Derivatives, [f64; 2])> {
+        let (merits, fixed) = (&found.merits, found.mean_square());
+        // What refocusing leaves is a difference.
+        let focused = (found.mean_square_focused(), fixed, self.mean_focused);
+        let mut pairs = vec![(fixed, fixed, self.mean), focused];
         for (i, spot) in merits.spots.iter().enumerate() {
             let waves = merits.wavefronts[i];
-            pairs.push((spot.a.into(), self.mean_square[i]));
-            pairs.push((waves.chief.into(), self.wavefront_variance_chief[i]));
-            pairs.push((waves.tilt_removed.into(), self.wavefront_variance_tilt_removed[i]));
+            for (found, exact) in [
+                (spot.a, self.mean_square[i]),
+                (waves.chief, self.wavefront_variance_chief[i]),
+                (waves.tilt_removed, self.wavefront_variance_tilt_removed[i]),
+            ] {
+                let found = Derivatives::from(found);
+                pairs.push((found, found, exact));
+            }
         }
         pairs
     }

@@ -36,11 +36,11 @@ pub(super) struct WaveNumbers {
     combinations: ErrorCombinations,
     /// The compensators but for the focus: combinations of numbers, or tilts of the sensor.
     adjustments: Vec<AdjustedNumbers>,
-    /// How rays depend on the numbers.
+    /// The way to the derivatives of rays by the numbers.
     source: NumberSource,
 }
 
-/// What a compensator changes.
+/// The numbers that a compensator changes, or the sensor.
 enum AdjustedNumbers {
     Lens(Vec<(usize, f64)>),
     Sensor(AdjustedPart),

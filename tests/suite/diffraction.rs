@@ -33,7 +33,7 @@ fn contrast(lens: &ImageLens<'_>, tolerance: f64) -> (Worst, f64) {
                 let tangential = exact["lines"] == "tangential";
                 let got = if tangential { point.tangential } else { point.sagittal };
                 let place = format!("{} {nu:?} {got:?}", field.y);
-                let error = got.numerical_error() + 1e-12;
+                let error = got.numerical_error() + ROUNDING;
                 stated = stated.max(error);
                 worst.note(got.modulus.value, number(&exact["diffraction"]), error, &place);
                 if !poly {
@@ -45,6 +45,9 @@ fn contrast(lens: &ImageLens<'_>, tolerance: f64) -> (Worst, f64) {
     }
     (worst, stated)
 }
+
+/// The rounding of paths of some 1e5 waves, as a part of a contrast.
+const ROUNDING: f64 = 2e-11;
 
 /// Every contrast of the file lies within the error that is stated for its computation, at any tolerance, and every
 /// tolerance is reached: what the choice of the sphere leaves is no error of a number on this sphere.

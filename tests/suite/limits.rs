@@ -285,6 +285,7 @@ fn penalties_are_kept_when_a_goal_asks_for_them() {
 #[test]
 fn light_is_kept_where_clipping_begins() {
     let mut lens = bundled("telescope_rc_f8");
+    lens.surfaces[0].obstruction = None;
     lens.variables.clear();
     add_variables(&mut lens, &[ParameterKind::Curvatures, ParameterKind::Thicknesses]);
     let goal = default_goal(&lens);
