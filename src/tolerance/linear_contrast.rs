@@ -35,9 +35,10 @@ pub(super) fn linear_changes(
         return Ok(None);
     }
     let judge = LinearJudge::new(coarse, (sheet, frequency), stop)?;
+    let planes = TwoPlanes::new(scene, 0.0)?;
     let mut sum: Option<Vec<ContrastChange>> = None;
     for field in 0..scene.beam.fields.len() {
-        let found = judge.field(scene, field, stop)?;
+        let found = judge.field((scene, &planes), field, stop)?;
         sum = Some(match sum {
             None => found,
             Some(sum) => sum.into_iter().zip(found).map(|(a, b)| a.plus(b)).collect(),
@@ -80,7 +81,7 @@ impl<'a> LinearJudge<'a> {
     /// The changes of the contrast of a field, times its weight.
     fn field(
         &self,
-        scene: &ToleranceScene,
+        (scene, planes): (&ToleranceScene, &TwoPlanes),
         field: usize,
         stop: StopTest<'_>,
     ) -> Result<Vec<ContrastChange>, ToleranceError> {
@@ -89,7 +90,7 @@ impl<'a> LinearJudge<'a> {
             (colour.wavelength, colour.rays.iter().copied().collect::<Rays<f64>>())
         };
         let colours: Vec<_> = beam.colours.iter().map(rays).collect();
-        let swept = TwoPlanes::new(scene, 0.0)?.rays(scene, field, &colours)?;
+        let swept = planes.rays(scene, field, &colours)?;
         let weights: Vec<f64> = beam.colours.iter().flat_map(|c| c.weights.clone()).collect();
         let at_rest = swept.at_rest();
         let landed = landed(beam.weight, at_rest.iter().copied().zip(weights.iter().copied()));

@@ -44,8 +44,8 @@ pub(super) struct ArrivedField<R> {
     /// The rays and, last, the chief ray.
     pub(super) rays: Vec<WaveRay<R>>,
     /// 1 for light that runs along the axis at the image, −1 for light that runs against it.
-    sense: f64,
-    index: R,
+    pub(super) sense: f64,
+    pub(super) index: R,
     /// The position of the image plane from the first vertex, in mm.
     pub(super) image: R,
 }

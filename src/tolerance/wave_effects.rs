@@ -115,7 +115,7 @@ impl WaveEffects {
             refuse_if_stopped(stop)?;
             let changes = match (&numbers.source, &traced) {
                 (NumberSource::Sweep(numbers), _) => {
-                    swept_changes((scene, &planes, beam), i, numbers)?
+                    swept_changes((scene, &planes, beam), (i, arrived), numbers)?
                 }
                 (NumberSource::Traces(_), traced) => traced
                     .iter()
@@ -158,16 +158,13 @@ fn traced_changes(
 /// The changes of the rays of a field by each number, by a sweep back.
 fn swept_changes(
     (scene, planes, beam): (&ToleranceScene, &TwoPlanes, &WaveBeam),
-    field: usize,
+    (field, arrived): (usize, &ArrivedField<f64>),
     numbers: &[MadeNumber],
 ) -> Result<Vec<RayChanges>, ToleranceError> {
     let rays: Rays<f64> = beam.fields[field].rays.iter().map(|(ray, _)| *ray).collect();
     let colours = [(beam.primary, rays)];
     let swept = planes.rays(scene, field, &colours)?;
     let paths = planes.near[beam.primary].error_paths(&colours[0].1);
-    let system = &scene.lens.systems[beam.primary];
-    let index = system.surfaces.last().map_or(1.0, |surface| surface.index);
-    let sense = if is_backward(system) { -1.0 } else { 1.0 };
     let at_rest = swept.at_rest();
     let change = |number: &MadeNumber| {
         let held = match number.kind {
@@ -177,7 +174,8 @@ fn swept_changes(
         };
         let ray = |(i, [dx, dy, du, dv]): (usize, [f64; 4])| {
             let [_, _, u, v] = at_rest[i];
-            let end = sense * index * (u * dx + v * dy) / (1.0 + u * u + v * v).sqrt();
+            let end =
+                arrived.sense * arrived.index * (u * dx + v * dy) / (1.0 + u * u + v * v).sqrt();
             [dx, dy, du, dv, held.map_or(0.0, |held| held[i]) + end]
         };
         let changes = swept.changes(std::iter::once((number, 1.0))).into_iter();
@@ -188,11 +186,6 @@ fn swept_changes(
         }
     };
     Ok(numbers.iter().map(change).collect())
-}
-
-/// True if light arrives at the image plane against the axis.
-fn is_backward(system: &System<f64>) -> bool {
-    system.surfaces.iter().filter(|surface| surface.mirror).count() % 2 == 1
 }
 
 /// The wavefront of a field at a position of its image plane, less piston and tilt, times the roots of the
