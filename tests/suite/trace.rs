@@ -594,13 +594,15 @@ fn a_reversed_lens_leads_rays_back_to_where_they_came_from() {
         let lens = bundled(name);
         let system = lens.resolve(0, lens.wavelengths[lens.primary()].um).unwrap();
         let size = system.surfaces[0].semi_diameter.min(100.0);
+        let shadow = system.surfaces[0].obstruction;
         let (there, back) =
             (Tracer::new(&system).unwrap(), Tracer::new(&system.reversed(0.0)).unwrap());
         let last = system.surfaces[system.surfaces.len() - 2].thickness;
         let mut arrived = 0;
         for i in 0..40 {
             let (sin, cos) = (f64::from(i) * 2.4).sin_cos();
-            let (x, y) = (0.02 * f64::from(i) * size * cos, 0.02 * f64::from(i) * size * sin);
+            let radius = shadow + 0.02 * f64::from(i) * size;
+            let (x, y) = (radius * cos, radius * sin);
             let start = Ray { point: Vec3::new(x, y, 0.0), direction: Vec3::new(0.01, 0.0, 1.0) };
             let landing = there.trace(start);
             if !landing.fate.is_imaged() {
