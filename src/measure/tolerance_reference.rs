@@ -462,6 +462,10 @@ fn sheet(errors: &[DrawnError], distribution: Option<ErrorDistribution>) -> Tole
 /// The rounding of a sum, as a share of its terms.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
+/// The derivative by a millimetre or a radian, as a share of a merit, up to which one is judged as one of that size:
+/// of a derivative that symmetry makes 0, the rounding of optical paths of many wavelengths is left.
+const VANISHING: f64 = 1e-2;
+
 /// Notes a first derivative relative to the larger of itself and `√|value × second|`, and a second one; what
 /// symmetry makes 0 is rounding, and so is what is left of the terms of a merit, of which one is `part`.
 fn note_derivatives(
@@ -469,7 +473,7 @@ fn note_derivatives(
     (found, part): (Derivatives, Derivatives),
     [first, second]: [f64; 2],
 ) {
-    let floor = 1e-3 * found.value;
+    let floor = VANISHING * found.value;
     let scale = first.abs().max((found.value * second).abs().sqrt()).max(floor);
     let beyond = |apart: f64, part: f64| (apart.abs() - ROUNDING * part.abs()).max(0.0);
     rows[0].note(beyond(found.first - first, part.first) / scale);

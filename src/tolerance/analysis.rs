@@ -172,33 +172,26 @@ impl ErrorModel {
             return Err(ToleranceError::Other(text));
         }
         let errors: Vec<Perturbation> = sheet.errors.iter().map(|t| t.error).collect();
-        let mut effects = RayEffects::with_moving_pupils(scene, &errors, second, stop)?;
+        let effects = RayEffects::with_moving_pupils(scene, &errors, second, stop)?;
         let compensation = Compensation::new(scene, sheet)?;
-        let forms = |effects: &RayEffects| {
-            refuse_if_stopped(stop)?;
-            Ok::<_, ToleranceError>(
-                TREATMENTS.map(|focus| QuadraticForm::new(effects, focus, &compensation)),
-            )
-        };
-        let mut found = forms(&effects)?;
+        refuse_if_stopped(stop)?;
+        let forms = TREATMENTS.map(|focus| {
+            QuadraticForm::with_moving_and_held_pupils(&effects, focus, &compensation)
+        });
+        let [[fixed, fixed_held], [refocused, refocused_held]] = forms;
+        let (moving, held) = ([fixed, refocused], [fixed_held, refocused_held]);
         let pupils = match &scene.pupils {
             PupilTreatment::Held(why) => PupilMotion::held(why),
             PupilTreatment::Known(own) if effects.has_moving_pupils() => {
-                let moving = effects.clone();
-                effects.hold_pupils();
-                let held = forms(&effects)?;
-                let motion = PupilMotion::new(own, &moving, sheet, (&found, &held))?;
-                if !motion.moves {
-                    found = held;
-                }
-                motion
+                PupilMotion::new(own, &effects, sheet, (&moving, &held))?
             }
             PupilTreatment::Known(_) => {
                 PupilMotion::held("a ray on the edge of a pupil does not arrive")
             }
         };
+        let forms = if pupils.moves { moving } else { held };
         let has_second_derivatives = effects.has_second_derivatives();
-        Ok(Self { compensation, forms: found, has_second_derivatives, pupils })
+        Ok(Self { compensation, forms, has_second_derivatives, pupils })
     }
 
     /// The analysis by random lenses: many by the forms, and some by their rays, fewer once `stop`

@@ -21,7 +21,7 @@ use crate::lens::Perturbation;
 use crate::math::dot;
 use crate::pupil::EdgeRay;
 use crate::trace::Tracer;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -171,11 +171,6 @@ impl RayEffects {
         self.fields.iter().all(|field| field.edge.is_some())
     }
 
-    /// Holds the pupils.
-    pub(super) fn hold_pupils(&mut self) {
-        self.fields.iter_mut().for_each(|field| field.edge = None);
-    }
-
     /// The share of the light that each error moves by one unit at the edges of pupils, whether it comes or goes.
     pub(super) fn moved_light(&self) -> Vec<f64> {
         let mut moved = vec![0.0; self.combinations.len()];
@@ -192,10 +187,8 @@ impl RayEffects {
     pub(super) fn edges_by_limit(&self) -> Vec<Vec<(EdgeRay, Vec<f64>)>> {
         let field = |field: &FieldEffects| {
             let Some(edge) = &field.edge else { return Vec::new() };
-            let displaced = &field.displacement + self.focus * &field.bend;
             let offsets = &field.offsets + self.focus * &field.slopes;
-            let found =
-                edge.by_limit(&field.inner(&self.parities, (&displaced, &offsets)), self.focus);
+            let found = edge.by_limit(&field.inner(&self.parities, &offsets), self.focus);
             let by_errors = |(ray, by): (EdgeRay, DVector<f64>)| {
                 let sum = |row: &Vec<(usize, f64)>| row.iter().map(|(m, f)| f * by[*m]).sum();
                 (ray, self.combinations.iter().map(sum).collect())
@@ -368,10 +361,15 @@ impl TwoPlanes {
                 centred_effect(&near, (axis, number), cancels, &mut rows[0]),
                 centred_effect(&far, (axis, number), cancels, &mut rows[1]),
             ];
-            for i in 0..rays {
-                let at = (axis * rays + i, m);
-                displacement[at] = roots[i] * rows[0][i];
-                bend[at] = roots[i] * (rows[1][i] - rows[0][i]) / self.distance;
+            let own = (2 * m + axis) * rays..(2 * m + axis + 1) * rays;
+            let displacement = &mut displacement.as_mut_slice()[own.clone()];
+            let bend = &mut bend.as_mut_slice()[own];
+            let both = displacement.iter_mut().zip(bend).zip(&roots);
+            for (((displacement, bend), root), (near, far)) in
+                both.zip(rows[0].iter().zip(&rows[1]))
+            {
+                *displacement = root * near;
+                *bend = root * (far - near) / self.distance;
             }
         }
         Ok(((displacement, bend), means))
@@ -446,11 +444,11 @@ impl FieldEffects {
         }
     }
 
-    /// The rays inside the pupils at an image plane where they have these displacements and distances.
+    /// The rays inside the pupils at an image plane where they have these distances from the centroid.
     fn inner<'a>(
         &'a self,
         parities: &'a [ErrorParity],
-        (displacement, offsets): (&'a DMatrix<f64>, &'a DVector<f64>),
+        offsets: &'a DVector<f64>,
     ) -> InnerRays<'a> {
         InnerRays {
             symmetry: self.symmetry,
@@ -459,8 +457,39 @@ impl FieldEffects {
             roots: &self.roots,
             offsets,
             slopes: &self.slopes,
-            displacement,
         }
+    }
+
+    /// All effects at an image plane that is displaced by `shift`, where the rays have these distances from the
+    /// centroid: those of numbers, of compensators besides focus, the slopes, and the distances.
+    fn displaced(
+        &self,
+        (parities, compensation): (&[ErrorParity], &Compensation),
+        shift: f64,
+        offsets: &DVector<f64>,
+    ) -> DisplacedEffects {
+        let (order, classes) = classes_of(parities, self.symmetry);
+        let (numbers, last) = (self.displacement.ncols(), parities.len() - 1);
+        let mut values = Vec::with_capacity(self.offsets.len() * parities.len());
+        for number in &order {
+            match *number {
+                number if number == last => values.extend_from_slice(offsets.as_slice()),
+                number if number + 1 == last => values.extend_from_slice(self.slopes.as_slice()),
+                number if number < numbers => {
+                    let rows = number * self.offsets.len()..(number + 1) * self.offsets.len();
+                    let bend = &self.bend.as_slice()[rows.clone()];
+                    let both = self.displacement.as_slice()[rows].iter().zip(bend);
+                    values.extend(both.map(|(displacement, bend)| displacement + shift * bend));
+                }
+                number => {
+                    let rays = &compensation.effects[number - numbers].rays;
+                    let displacement = self.column(rays, |ray| ray.displacement);
+                    let bend = self.column(rays, |ray| ray.bend);
+                    values.extend_from_slice((displacement + shift * bend).as_slice());
+                }
+            }
+        }
+        DisplacedEffects { order, classes, values }
     }
 
     /// The column of an effect that is known for all rays of all fields.
@@ -470,6 +499,32 @@ impl FieldEffects {
         };
         DVector::from_iterator(2 * self.places.len(), axis(0).chain(axis(1)))
     }
+}
+
+/// The effects on the rays of a field, in classes of which the products do not cancel.
+struct DisplacedEffects {
+    /// The effects in the order of their columns.
+    order: Vec<usize>,
+    /// The columns of each class.
+    classes: Vec<Range<usize>>,
+    /// The columns one after the other.
+    values: Vec<f64>,
+}
+
+/// Effects of these parities in an order in which those of a class follow each other, and the classes: products
+/// with another class cancel.
+fn classes_of(parities: &[ErrorParity], symmetry: RaySymmetry) -> (Vec<usize>, Vec<Range<usize>>) {
+    let (mut order, mut classes) = (Vec::with_capacity(parities.len()), Vec::new());
+    let mut rest: Vec<usize> = (0..parities.len()).collect();
+    while let Some(first) = rest.first() {
+        let first = parities[*first];
+        let cancels = |i: &usize| symmetry.cancels_product(first, parities[*i]);
+        let (others, class): (Vec<usize>, Vec<usize>) = rest.iter().partition(|i| cancels(i));
+        classes.push(order.len()..order.len() + class.len());
+        order.extend(class);
+        rest = others;
+    }
+    (order, classes)
 }
 
 /// Mean products over the rays of all fields: of numbers, then compensators besides focus, then slopes,
@@ -489,31 +544,29 @@ impl EffectProducts {
         shift: f64,
     ) {
         let numbers = field.displacement.ncols();
-        let mut values = DMatrix::zeros(field.offsets.len(), parities.len());
-        let displaced = &field.displacement + shift * &field.bend;
-        values.columns_mut(0, numbers).copy_from(&displaced);
-        for (a, effect) in compensation.effects.iter().enumerate() {
-            let displacement = field.column(&effect.rays, |ray| ray.displacement);
-            let bend = field.column(&effect.rays, |ray| ray.bend);
-            values.set_column(numbers + a, &(displacement + shift * bend));
-        }
-        let last = parities.len() - 1;
+        let rows = field.offsets.len();
         let offsets = &field.offsets + shift * &field.slopes;
-        values.set_column(last - 1, &field.slopes);
-        values.set_column(last, &offsets);
-        let found = values.transpose() * &values;
-        for (i, parity) in parities.iter().enumerate() {
-            for (j, other) in parities.iter().enumerate() {
-                if !field.symmetry.cancels_product(*parity, *other) {
-                    self.products[(i, j)] += found[(i, j)];
+        let displaced = field.displaced((parities, compensation), shift, &offsets);
+        let columns = |range: Range<usize>| &displaced.values[range.start * rows..range.end * rows];
+        for class in &displaced.classes {
+            let (own, count) = (columns(class.clone()), class.len());
+            let own = DMatrixView::from_slice(own, rows, count);
+            let found = own.transpose() * own;
+            let order = &displaced.order[class.clone()];
+            for (j, to) in order.iter().enumerate() {
+                for (i, from) in order.iter().enumerate() {
+                    self.products[(*from, *to)] += found[(i, j)];
                 }
             }
         }
         if let Some(edge) = &field.edge {
-            let inner = field.inner(&parities[..numbers], (&displaced, &offsets));
-            self.edge.add(edge, &inner, shift);
+            let mut places = vec![0; parities.len()];
+            displaced.order.iter().enumerate().for_each(|(place, number)| places[*number] = place);
+            let inner = field.inner(&parities[..numbers], &offsets);
+            self.edge
+                .add(edge, &inner, shift, |number| columns(places[number]..places[number] + 1));
         }
-        let bends = field.bend.transpose() * &offsets;
+        let bends = field.bend.tr_mul(&offsets);
         for (m, parity) in parities[..numbers].iter().enumerate() {
             if !field.symmetry.cancels_product(*parity, ErrorParity::EVEN) {
                 self.bends_with_offsets[m] += bends[m];

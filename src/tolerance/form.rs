@@ -12,8 +12,9 @@
 
 use super::ToleranceError;
 use super::compensation::Compensation;
-use super::effects::{ErrorCombinations, RayEffects};
+use super::effects::{EffectProducts, ErrorCombinations, RayEffects};
 use super::mixture::ErrorMixture;
+use super::pupil_edge::EdgeProducts;
 use super::reduced::ReducedForm;
 use crate::lens::{Compensator, ToleranceSheet};
 use crate::solve::{BoxedQuadratic, scaled_pseudoinverse};
@@ -131,11 +132,29 @@ impl AdjustedForm {
 impl QuadraticForm {
     /// The form of a lens from the effects of its errors.
     pub fn new(effects: &RayEffects, focus: FocusTreatment, compensation: &Compensation) -> Self {
-        let form = FixedForm::new(effects, focus, compensation);
-        match focus {
-            FocusTreatment::Fixed => form.without_adjustment(),
-            FocusTreatment::Refocused => form.adjusted(&compensation.adjustments),
-        }
+        let [moving, _] = Self::with_moving_and_held_pupils(effects, focus, compensation);
+        moving
+    }
+
+    /// The form with the motion of the edges of pupils where it is known, and that with the pupils held.
+    pub(super) fn with_moving_and_held_pupils(
+        effects: &RayEffects,
+        focus: FocusTreatment,
+        compensation: &Compensation,
+    ) -> [Self; 2] {
+        let (shift, plane) = match focus {
+            FocusTreatment::Refocused => (effects.focus(), 1),
+            FocusTreatment::Fixed => (0.0, 0),
+        };
+        let products = effects.products(compensation, shift);
+        let held = EdgeProducts::none(effects.numbers());
+        [products.edge(), &held].map(|edge| {
+            let form = FixedForm::new(effects, (shift, plane), (&products, edge), compensation);
+            match focus {
+                FocusTreatment::Fixed => form.without_adjustment(),
+                FocusTreatment::Refocused => form.adjusted(&compensation.adjustments),
+            }
+        })
     }
 
     /// The mean square spot radius of a lens with these errors, in mm²; a form knows no end at zero,
@@ -259,14 +278,15 @@ struct FixedForm {
 }
 
 impl FixedForm {
-    fn new(effects: &RayEffects, focus: FocusTreatment, compensation: &Compensation) -> Self {
-        let (shift, plane) = match focus {
-            FocusTreatment::Refocused => (effects.focus(), 1),
-            FocusTreatment::Fixed => (0.0, 0),
-        };
-        let products = effects.products(compensation, shift);
+    /// The form at a shift of the image plane, to which a second derivative belongs by number, from mean products
+    /// there and the addition by edges.
+    fn new(
+        effects: &RayEffects,
+        (shift, plane): (f64, usize),
+        (products, edge): (&EffectProducts, &EdgeProducts),
+        compensation: &Compensation,
+    ) -> Self {
         let (count, adjustments) = (effects.numbers(), compensation.adjustments.len());
-        let edge = products.edge();
         let by_focus = |m: usize| {
             products.with_slopes(m) + products.bend_with_offsets(m) + edge.with_slopes[m]
         };

@@ -5,7 +5,7 @@ use super::wavefront::{PathRay, path_differences};
 use super::{Beam, FieldBeam, SpotMoments, ToleranceError, WavefrontVariance, best_focus};
 use crate::lens::System;
 use crate::math::{Real, Vec3};
-use crate::trace::{Ray, TracedRay, Tracer};
+use crate::trace::{Landings, Ray, Rays, TraceSink as _, TracedRay, Tracer};
 
 /// The quantities computed besides spots.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,12 +82,13 @@ pub(super) fn merits_of<R: Real>(
             let pupil = R::from_f64(pupil) - rear.image;
             let index = rear.systems[options.primary].surfaces.last().map_or(R::ONE, |s| s.index);
             let chief = land(&tracers[options.primary], field.chief.0, number, 0)?;
-            let chief = path_ray(&chief, field.chief.1);
+            let chief = path_ray(chief.ray, chief.opl, field.chief.1);
             let colour = field.colours.iter().position(|c| c.wavelength == options.primary);
             let Some(colour) = colour else { continue };
             let rays = &field.colours[colour];
-            let paths = landings[colour].iter().zip(&rays.paths);
-            let paths: Vec<_> = paths.map(|(landing, path)| path_ray(landing, *path)).collect();
+            let landed = &landings[colour];
+            let path = |(i, start): (usize, &f64)| path_ray(landed.ray(i), landed.opl[i], *start);
+            let paths: Vec<_> = rays.paths.iter().enumerate().map(path).collect();
             let waves = path_differences(&paths, &chief, pupil, index);
             let waves: Vec<R> = waves.into_iter().map(|w| w * R::from_f64(1.0 / um)).collect();
             let total: f64 = rays.weights.iter().sum();
@@ -113,11 +114,17 @@ fn trace_field<R: Real>(
     tracers: &[Tracer<R>],
     field: &FieldBeam,
     number: usize,
-) -> Result<Vec<Vec<TracedRay<R>>>, ToleranceError> {
+) -> Result<Vec<Landings<R>>, ToleranceError> {
     let colour = |colour: &super::ColourRays| {
-        let tracer = &tracers[colour.wavelength];
-        let rays = colour.rays.iter().enumerate();
-        rays.map(|(i, ray)| land(tracer, *ray, number, i)).collect()
+        let rays: Rays<R> = colour.rays.iter().map(|ray| ray.cast()).collect();
+        let mut landed = Landings::default();
+        tracers[colour.wavelength].trace_batch(&rays, &mut landed);
+        match (0..rays.len()).find(|ray| !landed.fate(*ray).is_imaged()) {
+            Some(ray) => {
+                Err(ToleranceError::RayLost { field: number, ray, fate: landed.fate(ray) })
+            }
+            None => Ok(landed),
+        }
     };
     field.colours.iter().map(colour).collect()
 }
@@ -137,19 +144,20 @@ fn land<R: Real>(
     }
 }
 
-fn path_ray<R: Real>(landing: &TracedRay<R>, start: f64) -> PathRay<R> {
-    let path = landing.opl + R::from_f64(start);
-    PathRay { point: landing.ray.point, direction: landing.ray.direction, path }
+fn path_ray<R: Real>(Ray { point, direction }: Ray<R>, path: R, start: f64) -> PathRay<R> {
+    PathRay { point, direction, path: path + R::from_f64(start) }
 }
 
 /// The rays of a field at the image plane, with their weights.
-fn image_rays<R: Real>(
-    field: &FieldBeam,
-    landings: &[Vec<TracedRay<R>>],
-) -> Vec<(ImageRay<R>, f64)> {
+fn image_rays<R: Real>(field: &FieldBeam, landings: &[Landings<R>]) -> Vec<(ImageRay<R>, f64)> {
     let colours = field.colours.iter().zip(landings);
-    let weighted = colours.flat_map(|(c, l)| l.iter().zip(&c.weights));
-    weighted.map(|(landing, w)| (image_ray(&landing.ray), *w)).collect()
+    let ray = |landed: &Landings<R>, i: usize| image_ray(&landed.ray(i));
+    colours
+        .flat_map(|(colour, landed)| {
+            let weights = colour.weights.iter().enumerate();
+            weights.map(move |(i, weight)| (ray(landed, i), *weight))
+        })
+        .collect()
 }
 
 /// The crossing of a ray with the image plane, on which it need not end: a sensor may be tilted.

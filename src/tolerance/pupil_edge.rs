@@ -25,7 +25,7 @@ use super::pupils::{FieldPupils, ScenePupils, with_rims};
 use super::sweep::SweptField;
 use super::{NominalLens, ToleranceError, ToleranceScene, perturb};
 use crate::lens::{Perturbation, PerturbationKind, System};
-use crate::math::Dual;
+use crate::math::{Dual, dot};
 use crate::pupil::EdgeRay;
 use crate::trace::{ErrorNumber, Ray, Rays, Tracer};
 use nalgebra::{DMatrix, DVector};
@@ -256,8 +256,7 @@ fn perturbation_of(MadeNumber { surface, kind }: MadeNumber) -> Option<Perturbat
     Some(Perturbation::of_surface(kind, surface))
 }
 
-/// The rays inside the pupils of a field: distances from the centroid and displacements by numbers, times
-/// the roots of weights.
+/// The rays inside the pupils of a field: distances from the centroid, times the roots of weights.
 pub(super) struct InnerRays<'a> {
     pub(super) symmetry: RaySymmetry,
     pub(super) parities: &'a [ErrorParity],
@@ -266,7 +265,6 @@ pub(super) struct InnerRays<'a> {
     pub(super) roots: &'a [f64],
     pub(super) offsets: &'a DVector<f64>,
     pub(super) slopes: &'a DVector<f64>,
-    pub(super) displacement: &'a DMatrix<f64>,
 }
 
 impl InnerRays<'_> {
@@ -274,21 +272,21 @@ impl InnerRays<'_> {
     fn mean(&self, colour: usize, a: &[f64], b: &[f64]) -> f64 {
         let count = self.roots.len();
         let range = self.colours[colour].clone();
-        let weight: f64 = self.roots[range.clone()].iter().map(|root| root * root).sum();
+        let roots = &self.roots[range.clone()];
+        let weight = dot(roots, roots);
         let along = |from: usize| {
             let own = from + range.start..from + range.end;
-            a[own.clone()].iter().zip(&b[own]).map(|(a, b)| a * b).sum::<f64>()
+            dot(&a[own.clone()], &b[own])
         };
         (along(0) + along(count)) / weight.max(f64::MIN_POSITIVE)
     }
 
-    /// The same of distances and displacements by a number, which cancel where that is odd.
-    fn mean_by(&self, colour: usize, number: usize) -> f64 {
+    /// The same of distances and these displacements by a number, which cancel where that is odd.
+    fn mean_by(&self, colour: usize, number: usize, displacement: &[f64]) -> f64 {
         if self.symmetry.mirrored && self.parities[number].odd {
             return 0.0;
         }
-        let column = self.displacement.column(number);
-        self.mean(colour, self.offsets.as_slice(), column.as_slice())
+        self.mean(colour, self.offsets.as_slice(), displacement)
     }
 
     /// True if the sum over the edge vanishes for an even quantity and the motion by a number.
@@ -316,8 +314,15 @@ impl EdgeProducts {
         }
     }
 
-    /// Adds the edge of a field at an image plane that is displaced by `shift`, where its inner rays are.
-    pub(super) fn add(&mut self, edge: &FieldEdge, inner: &InnerRays<'_>, shift: f64) {
+    /// Adds the edge of a field at an image plane that is displaced by `shift`, where its inner rays are and have
+    /// these displacements by each number.
+    pub(super) fn add<'a>(
+        &mut self,
+        edge: &FieldEdge,
+        inner: &InnerRays<'_>,
+        shift: f64,
+        displacement_by: impl Fn(usize) -> &'a [f64],
+    ) {
         let (squares, slopes) = edge.differences(inner, shift);
         let displaced = &edge.displacement + shift * &edge.bend;
         let offsets = &edge.offsets + shift * &edge.slopes;
@@ -326,7 +331,7 @@ impl EdgeProducts {
         for m in 0..numbers {
             let column = displaced.column(m);
             for (colour, range) in edge.colours.iter().enumerate() {
-                let mean = inner.mean_by(colour, m);
+                let mean = inner.mean_by(colour, m, displacement_by(m));
                 for k in range.clone() {
                     by[(k, m)] = edge.product(offsets.as_slice(), column.as_slice(), k) - mean;
                 }

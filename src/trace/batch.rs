@@ -518,7 +518,7 @@ impl<R: Real, const N: usize> RayBlock<R, N> {
     }
 
     #[inline(always)]
-    fn cross_mounted(
+    pub(super) fn cross_mounted(
         &mut self,
         interface: &Interface<R>,
         number: u32,

@@ -51,8 +51,7 @@ impl<R: Real> Tracer<R> {
     }
 
     /// The margin of a ray at one limit as by [`Tracer::margin`], with the rims and obstructions of
-    /// another tracer of the same lens; `None` also if a surface is not centred or a medium has a
-    /// gradient.
+    /// another tracer of the same lens; `None` also if a medium has a gradient.
     pub fn margin_with_rims(
         &self,
         rims: &Tracer<f64>,
@@ -60,11 +59,16 @@ impl<R: Real> Tracer<R> {
         surface: usize,
         limit: RayLimit,
     ) -> Option<R> {
-        if !self.is_plain() {
+        if !self.grin_gaps.is_empty() {
             return None;
         }
-        let (p, k) = self.state_before::<false>(ray, surface)?;
-        let arrived = self.propagate::<false>(surface, p, k);
+        let arrived = if self.is_plain() {
+            let (p, k) = self.state_before::<false>(ray, surface)?;
+            self.propagate::<false>(surface, p, k)
+        } else {
+            let (p, k) = self.state_before::<true>(ray, surface)?;
+            self.propagate::<true>(surface, p, k)
+        };
         let Interface { rim2, obstruction2, .. } = rims.interfaces[surface];
         let clipping = Interface {
             rim2: R::from_f64(rim2),

@@ -2,13 +2,14 @@
 //!
 //! The search for the edge of a pupil asks for a few dozen rays at a time. In small blocks these take
 //! the vector instructions that trace a bundle; every number has the same bits as that of a single
-//! ray. The margins at a rim or an obstruction follow from the point alone; those at other limits,
-//! and all in GRIN media, are computed ray by ray.
+//! ray. The margins at a rim or an obstruction follow from the point alone; those at other limits, and
+//! all in GRIN media and on freeforms, are computed ray by ray.
 
 use super::aperture::ApertureSet;
 use super::batch::{RayBlock, Rays, SMALL_BLOCK};
-use super::interface::Interface;
+use super::interface::{Interface, Intersection};
 use super::margin::RayLimit;
+use super::mount::Mount;
 use super::{AdjointSeed, SystemGradient, Tracer};
 use crate::math::{Real, SimdWidth, Vec3, run_vectorized};
 
@@ -16,7 +17,7 @@ impl<R: Real> Tracer<R> {
     /// The margin of every ray at one limit, as by [`Tracer::margin`]; NaN for a ray that does not
     /// get there.
     pub fn margins_at(&self, rays: &Rays<R>, surface: usize, limit: RayLimit) -> Vec<R> {
-        if !self.has_plain_margin(limit) {
+        if !self.has_block_margin(limit) {
             let margin = |i| self.margin(rays.get(i), surface, limit);
             return (0..rays.len()).map(|i| margin(i).unwrap_or(R::from_f64(f64::NAN))).collect();
         }
@@ -30,12 +31,21 @@ impl<R: Real> Tracer<R> {
             |block, count| {
                 let lost = block.code;
                 let mut lanes = [R::ZERO; SMALL_BLOCK];
-                block.cross_with(
-                    &last.open(),
-                    surface as u32,
-                    #[inline(always)]
-                    |j, met| lanes[j] = last.plain_margin(limit, met.point, apertures),
-                );
+                match self.vector_mount(surface) {
+                    Some(mount) => block.cross_mounted_open(
+                        last,
+                        surface as u32,
+                        mount,
+                        #[inline(always)]
+                        |j, met| lanes[j] = last.plain_margin(limit, met.point, apertures),
+                    ),
+                    None => block.cross_with(
+                        &last.open(),
+                        surface as u32,
+                        #[inline(always)]
+                        |j, met| lanes[j] = last.plain_margin(limit, met.point, apertures),
+                    ),
+                }
                 let nan = R::from_f64(f64::NAN);
                 margins.extend((0..count).map(|j| R::select(lost[j] > R::ZERO, nan, lanes[j])));
             },
@@ -47,7 +57,7 @@ impl<R: Real> Tracer<R> {
     /// not arrive.
     pub fn landings_at_edge(&self, rays: &Rays<R>, surface: usize, limit: RayLimit) -> Vec<[R; 2]> {
         let nan = [R::from_f64(f64::NAN); 2];
-        if !self.has_plain_margin(limit) {
+        if !self.has_block_margin(limit) {
             let landing = |i| self.land_at_edge(rays.get(i), surface, limit);
             return (0..rays.len()).map(|i| landing(i).map_or(nan, |p| [p.x, p.y])).collect();
         }
@@ -60,17 +70,11 @@ impl<R: Real> Tracer<R> {
         landings
     }
 
-    /// True if the margin at a limit follows from the point on the surface alone, between homogeneous
-    /// media throughout.
-    fn has_plain_margin(&self, limit: RayLimit) -> bool {
-        let is_plain_limit = matches!(
-            limit,
-            RayLimit::Rim
-                | RayLimit::Obstruction
-                | RayLimit::Aperture(_)
-                | RayLimit::Obscuration(_)
-        );
-        self.is_plain() && is_plain_limit
+    /// True if the margin at a limit follows from the point on the surface alone, and all surfaces are such as
+    /// blocks of rays cross between homogeneous media.
+    fn has_block_margin(&self, limit: RayLimit) -> bool {
+        let is_block_surface = |i: usize| !self.is_general(i) || self.vector_mount(i).is_some();
+        is_point_limit(limit) && (0..self.surfaces()).all(is_block_surface)
     }
 
     /// Traces rays to behind the first `count` surfaces, whose rims and obstructions clip nothing, and
@@ -101,8 +105,38 @@ impl<R: Real> Tracer<R> {
     #[inline(always)]
     fn cross_open(&self, block: &mut RayBlock<R, SMALL_BLOCK>, surfaces: usize) {
         for (i, interface) in self.interfaces[..surfaces].iter().enumerate() {
-            block.cross_with(&interface.open(), i as u32, |_, _| {});
+            match self.vector_mount(i) {
+                Some(mount) => block.cross_mounted_open(interface, i as u32, mount, |_, _| {}),
+                None => block.cross_with(&interface.open(), i as u32, |_, _| {}),
+            }
         }
+    }
+}
+
+/// True if the margin at a limit follows from the point on the surface alone.
+fn is_point_limit(limit: RayLimit) -> bool {
+    matches!(
+        limit,
+        RayLimit::Rim | RayLimit::Obstruction | RayLimit::Aperture(_) | RayLimit::Obscuration(_)
+    )
+}
+
+impl<R: Real> RayBlock<R, SMALL_BLOCK> {
+    /// Crosses a surface that is decentred, tilted or irregular, without what clips there. Never part of the
+    /// loop over centred surfaces, whose registers it would occupy.
+    #[inline(never)]
+    fn cross_mounted_open(
+        &mut self,
+        interface: &Interface<R>,
+        number: u32,
+        mount: &Mount<R>,
+        keep: impl FnMut(usize, &Intersection<R>),
+    ) {
+        run_vectorized(
+            SimdWidth::detect(),
+            #[inline(always)]
+            || self.cross_mounted(&interface.open(), number, (mount, None), keep),
+        );
     }
 }
 
@@ -116,7 +150,7 @@ impl Tracer<f64> {
         rays: &Rays<f64>,
         weights: &[f64],
     ) -> Option<SystemGradient<f64>> {
-        if !self.has_plain_margin(limit) {
+        if !self.is_plain() || !is_point_limit(limit) {
             return None;
         }
         let outwards = if limit == RayLimit::Rim { -2.0 } else { 2.0 };

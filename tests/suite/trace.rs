@@ -181,7 +181,21 @@ fn margins_of_many_rays_are_those_of_single_rays() {
     for surface in system.surfaces.iter_mut().step_by(3) {
         surface.obstruction = 0.1;
     }
-    let tracer = Tracer::new(&system).unwrap();
+    compare_margins(&system);
+    for (i, surface) in system.surfaces.iter_mut().enumerate() {
+        if i % 3 != 1 {
+            surface.pose = Some(Pose::new([0.01, -0.02], [0.01, -0.004]));
+        }
+        if i % 2 == 0 {
+            surface.astigmatism = Some(1e-3);
+        }
+    }
+    compare_margins(&system);
+}
+
+/// Compares margins and landings of rays in blocks with those of single rays, bit by bit.
+fn compare_margins(system: &System<f64>) {
+    let tracer = Tracer::new(system).unwrap();
     let height = system.surfaces[0].semi_diameter;
     let ray = |i: usize| {
         let (x, y) = (0.05 * (i % 5) as f64, 0.08 * (i / 5) as f64 - 1.0);

@@ -187,7 +187,8 @@ impl MeasureToleranceReport {
             row(contrast, String::new(), ms(merits.contrast_ms));
         }
         row("yield by the quadratic form, one core".into(), ms(50.0), ms(cost.form_ms));
-        row(format!("{samples} real lenses, two cores"), ms(1000.0), ms(cost.samples_ms));
+        let real = format!("{samples} real lenses, {} rays each, two cores", cost.samples_rays);
+        row(real, ms(1000.0), ms(cost.samples_ms));
         for gradient in &cost.gradients {
             let what = format!("as-built gradient, {} tolerances", gradient.tolerances);
             let ratio = format!("{:.1} x ({})", gradient.ordinary_gradients, ms(gradient.ms));
