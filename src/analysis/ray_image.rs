@@ -136,8 +136,9 @@ fn arrived_light(lit: &[(f64, &Region<'_>)], order: usize) -> ArrivedLight {
 struct LightSums {
     cells: Vec<f64>,
     circles: Vec<f64>,
-    /// The radii that hold shares, in mm.
-    share_radii: Vec<f64>,
+    /// The shares whose circles are looked for, with their radii in mm.
+    share_radii: Vec<(f64, f64)>,
+    distances: RayDistances,
 }
 
 /// The distances of rays from a point, ascending, with the share of the light up to each.
@@ -167,6 +168,12 @@ impl RayDistances {
         let last = self.distances.len().saturating_sub(1);
         self.distances.get(at.min(last)).copied().unwrap_or(0.0)
     }
+
+    /// The share of the light within a distance.
+    fn share_within(&self, radius: f64) -> f64 {
+        let count = self.distances.partition_point(|distance| *distance <= radius);
+        count.checked_sub(1).map_or(0.0, |last| self.within[last])
+    }
 }
 
 /// The errors of sums.
@@ -184,7 +191,8 @@ impl LightSums {
         let mut sums = Self {
             cells: vec![0.0; count * count],
             circles: vec![0.0; radii.len()],
-            share_radii: shares.iter().map(|share| distances.radius(*share)).collect(),
+            share_radii: shares.iter().map(|share| (*share, distances.radius(*share))).collect(),
+            distances,
         };
         let step = 2.0 * half_width / (count.max(2) - 1) as f64;
         let mut total = 0.0;
@@ -218,12 +226,27 @@ impl LightSums {
         let change = |(a, b): (&f64, &f64)| CHANGES * (a - b).abs();
         // A circle jumps over whole rows of rays: that of one alone may stand still by chance.
         let circles = self.circles.iter().zip(&before.circles).map(change).fold(0.0, f64::max);
+        let share_radii = self.radius_errors(before, circles);
         let circles = vec![circles; self.circles.len()];
         let peak = self.peak().max(f64::MIN_POSITIVE);
         let cells = self.cells.iter().zip(&before.cells).map(change);
         let density = cells.fold(0.0, f64::max) / peak;
-        let share_radii = self.share_radii.iter().zip(&before.share_radii).map(change).collect();
         SumErrors { circles, density, share_radii }
+    }
+
+    /// The errors of the radii of shares: their changes, and those by the largest error of a share, `circles` or that
+    /// within one of these radii, since the radius is the distance of one ray, which may stand still by chance.
+    fn radius_errors(&self, before: &Self, circles: f64) -> Vec<f64> {
+        let both = || self.share_radii.iter().zip(&before.share_radii);
+        let by_radius = |((share, _), (_, radius)): (&(f64, f64), &(f64, f64))| {
+            CHANGES * (self.distances.share_within(*radius) - share).abs()
+        };
+        let by_share = both().map(by_radius).fold(circles, f64::max);
+        let error = |((share, radius), (_, earlier)): (&(f64, f64), &(f64, f64))| {
+            let [low, high] = [-by_share, by_share].map(|by| self.distances.radius(share + by));
+            (CHANGES * (radius - earlier).abs()).max(0.5 * (high - low))
+        };
+        both().map(error).collect()
     }
 
     fn image(
@@ -238,7 +261,7 @@ impl LightSums {
             center,
             energy: energy.map(|(share, error)| Estimate::new(*share, error, rays)).collect(),
             share_radii: share_radii
-                .map(|(radius, error)| Estimate::new(*radius, error, rays))
+                .map(|((_, radius), error)| Estimate::new(*radius, error, rays))
                 .collect(),
             density: SquareGrid {
                 count: request.count,

@@ -74,6 +74,6 @@ pub use tolerance::{
 };
 pub use tolerance_cases::{MeritSweepCost, PoseCost};
 pub use tolerance_reference::{
-    AgreementRow, ReferenceAgreement, ReferenceLens, ToleranceReference,
+    AgreementRow, ReferenceAgreement, ReferenceLens, ToleranceReference, ToleranceReferenceError,
 };
 pub use trace::{BenchmarkError, Throughput, TraceRow, measure_throughput};

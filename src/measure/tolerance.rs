@@ -64,7 +64,7 @@ pub struct ToleranceBenchmark {
     pub form_ms: f64,
     /// The number of real lenses.
     pub samples: usize,
-    /// The number of rays of each as the command traces them, those of opposite fields included.
+    /// The number of rays of each as the command traces them, those that find its pupils included.
     pub samples_rays: usize,
     /// The time of all these lenses on two cores, in milliseconds.
     pub samples_ms: f64,
@@ -161,7 +161,7 @@ pub fn measure_tolerances(
         jets_ms,
         form_ms,
         samples: traced?,
-        samples_rays: sampled.beam.rays(),
+        samples_rays: sampled.rays_of_real_lens(moves),
         samples_ms,
         gradients: one.install(|| gradient_costs(lens, &sheet))?,
         merits: merit_sweep_cost((lens, &scene, ACCURACY), &sheet, &one).ok(),

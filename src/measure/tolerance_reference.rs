@@ -216,7 +216,68 @@ impl AgreementRow {
     }
 }
 
+/// The entry that a lens of such a file lacks.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{lens}: {what}")]
+pub struct ToleranceReferenceError {
+    lens: String,
+    what: String,
+}
+
+impl ToleranceReference {
+    /// Checks that lists have an entry for every field and wavelength.
+    ///
+    /// # Errors
+    /// The first list that is shorter or longer, and a number that counts none of them.
+    pub fn check(&self) -> Result<(), ToleranceReferenceError> {
+        let with_name = |lens: &ReferenceLens| {
+            let named = |what| ToleranceReferenceError { lens: lens.id.clone(), what };
+            lens.check().map_err(named)
+        };
+        self.lenses.iter().try_for_each(with_name)
+    }
+}
+
+/// Refuses a list of another length.
+fn check_length(what: &str, found: usize, expected: usize) -> Result<(), String> {
+    let text = || format!("{what}: found {found} entries; expected {expected}");
+    (found == expected).then_some(()).ok_or_else(text)
+}
+
+/// Refuses a number that counts none of so many.
+fn check_place(what: &str, found: usize, count: usize) -> Result<(), String> {
+    (found < count).then_some(()).ok_or_else(|| format!("{what}: found {found} of {count}"))
+}
+
 impl ReferenceLens {
+    fn check(&self) -> Result<(), String> {
+        let (fields, colours) = (self.fields_deg.len(), self.wavelengths_um.len());
+        check_length("wavelength_weights", self.wavelength_weights.len(), colours)?;
+        check_place("primary", self.primary, colours)?;
+        check_place("fields_deg", 0, fields)?;
+        for surface in &self.surfaces {
+            check_length("n", surface.n.len(), colours)?;
+        }
+        for answer in &self.derivatives {
+            check_length("mean_square", answer.mean_square.len(), fields)?;
+            for list in [&answer.wavefront_variance_chief, &answer.wavefront_variance_tilt_removed]
+            {
+                check_length("wavefront variances", list.len(), fields)?;
+            }
+        }
+        for case in &self.cases {
+            let MeritAnswer { ms, msc, vchief, vtilt } = &case.merits;
+            for list in [ms, msc, vchief, vtilt] {
+                check_length("merits", list.len(), fields)?;
+            }
+            for ray in &case.rays {
+                check_place("wavelength of a ray", ray.wavelength, colours)?;
+                check_place("field of a ray", ray.field, fields)?;
+            }
+        }
+        Ok(())
+    }
+
     /// The lens without errors.
     pub fn nominal(&self) -> NominalLens {
         NominalLens {
@@ -234,8 +295,7 @@ impl ReferenceLens {
             let mut terms = [0.0; ASPHERE_TERMS];
             terms.iter_mut().zip(&own.asphere).for_each(|(to, from)| *to = *from);
             let shape = Shape::simplest(curvature, own.conic, terms);
-            let index = own.n.get(wavelength).copied().unwrap_or(1.0);
-            Surface { shape, ..Surface::plane(own.thickness, index) }
+            Surface { shape, ..Surface::plane(own.thickness, own.n[wavelength]) }
         };
         let mut surfaces: Vec<_> = self.surfaces.iter().map(surface).collect();
         surfaces.push(Surface::plane(0.0, 1.0));
@@ -346,9 +406,10 @@ impl ReferenceLens {
         for case in &self.cases {
             let systems = perturb(&self.nominal(), &case.errors())?;
             for ray in &case.rays {
-                let Some(system) = systems.get(ray.wavelength) else { continue };
+                let system = &systems[ray.wavelength];
                 let path = Tracer::new(system)?.polyline(self.ray(ray.field, ray.pupil).0);
-                row.answers += ray.hits.len().saturating_sub(path.points.len() - 1);
+                // A ray that is lost gives no answer where it does not get.
+                (path.points.len() - 1..ray.hits.len()).for_each(|_| row.note(f64::INFINITY));
                 for (found, hit) in path.points[1..].iter().zip(&ray.hits) {
                     let [x, y, z] = hit.each_ref().map(LongNumber::value);
                     let apart = *found - Vec3::new(x, y, z);
@@ -391,8 +452,8 @@ impl ReferenceLens {
             AgreementRow::new("second derivatives", self.bound(1e-7)),
         ];
         for (found, answer) in found.iter().zip(&self.derivatives) {
-            for (found, part, exact) in answer.pairs(found) {
-                note_derivatives(&mut rows, (found, part), exact);
+            for answer in answer.pairs(found) {
+                answer.note(&mut rows);
             }
         }
         Ok(rows)
@@ -415,7 +476,7 @@ impl ReferenceLens {
             // The second ones leave out those of rays by two errors.
             let second = answer.mean[1];
             let found = Derivatives { value: form.nominal, first: form.first[i], second };
-            note_derivatives(&mut rows, (found, found), answer.mean);
+            FoundDerivatives::of_spot(found, answer.mean).note(&mut rows);
         }
         Ok(rows[0])
     }
@@ -462,22 +523,40 @@ fn sheet(errors: &[DrawnError], distribution: Option<ErrorDistribution>) -> Tole
 /// The rounding of a sum, as a share of its terms.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
-/// The derivative by a millimetre or a radian, as a share of a merit, up to which one is judged as one of that size:
-/// of a derivative that symmetry makes 0, the rounding of optical paths of many wavelengths is left.
-const VANISHING: f64 = 1e-2;
+/// The derivatives of a merit with their exact values.
+struct FoundDerivatives {
+    found: Derivatives,
+    /// One of the terms of which the merit is the difference.
+    part: Derivatives,
+    exact: [f64; 2],
+    /// The first derivative by a millimetre or a radian, as a share of the merit, up to which one is judged as one
+    /// of that size: of one that symmetry makes 0 rounding is left.
+    vanishing: f64,
+}
 
-/// Notes a first derivative relative to the larger of itself and `√|value × second|`, and a second one; what
-/// symmetry makes 0 is rounding, and so is what is left of the terms of a merit, of which one is `part`.
-fn note_derivatives(
-    rows: &mut [AgreementRow; 2],
-    (found, part): (Derivatives, Derivatives),
-    [first, second]: [f64; 2],
-) {
-    let floor = VANISHING * found.value;
-    let scale = first.abs().max((found.value * second).abs().sqrt()).max(floor);
-    let beyond = |apart: f64, part: f64| (apart.abs() - ROUNDING * part.abs()).max(0.0);
-    rows[0].note(beyond(found.first - first, part.first) / scale);
-    rows[1].note(beyond(found.second - second, part.second) / second.abs().max(floor));
+/// The same share of second derivatives.
+const VANISHING: f64 = 1e-3;
+
+impl FoundDerivatives {
+    fn of_spot(found: Derivatives, exact: [f64; 2]) -> Self {
+        Self { found, part: found, exact, vanishing: VANISHING }
+    }
+
+    /// Those of a wavefront, whose optical paths of many wavelengths leave more rounding.
+    fn of_wavefront(found: Derivatives, exact: [f64; 2]) -> Self {
+        Self { vanishing: 10.0 * VANISHING, ..Self::of_spot(found, exact) }
+    }
+
+    /// Notes the first derivative relative to the larger of itself and `√|value × second|`, and the second one.
+    fn note(&self, rows: &mut [AgreementRow; 2]) {
+        let (found, [first, second]) = (self.found, self.exact);
+        let scale = first.abs().max((found.value * second).abs().sqrt());
+        let beyond = |apart: f64, part: f64| (apart.abs() - ROUNDING * part.abs()).max(0.0);
+        let apart = beyond(found.first - first, self.part.first);
+        rows[0].note(apart / scale.max(self.vanishing * found.value));
+        let apart = beyond(found.second - second, self.part.second);
+        rows[1].note(apart / second.abs().max(VANISHING * found.value));
+    }
 }
 
 impl PerturbedAnswer {
@@ -487,21 +566,23 @@ impl PerturbedAnswer {
 }
 
 impl ErrorAnswer {
-    /// The derivatives of a lens, those of a part of each, and their exact values.
-    fn pairs(&self, found: &Sensitivity) -> Vec<(Derivatives, Derivatives, [f64; 2])> {
+    /// The derivatives of a lens with their exact values.
+    fn pairs(&self, found: &Sensitivity) -> Vec<FoundDerivatives> {
         let (merits, fixed) = (&found.merits, found.mean_square());
+        let focused = found.mean_square_focused();
         // What refocusing leaves is a difference.
-        let focused = (found.mean_square_focused(), fixed, self.mean_focused);
-        let mut pairs = vec![(fixed, fixed, self.mean), focused];
-        for (i, spot) in merits.spots.iter().enumerate() {
-            let waves = merits.wavefronts[i];
+        let focused = FoundDerivatives::of_spot(focused, self.mean_focused);
+        let mut pairs = vec![
+            FoundDerivatives::of_spot(fixed, self.mean),
+            FoundDerivatives { part: fixed, ..focused },
+        ];
+        for (i, (spot, waves)) in merits.spots.iter().zip(&merits.wavefronts).enumerate() {
+            pairs.push(FoundDerivatives::of_spot(spot.a.into(), self.mean_square[i]));
             for (found, exact) in [
-                (spot.a, self.mean_square[i]),
                 (waves.chief, self.wavefront_variance_chief[i]),
                 (waves.tilt_removed, self.wavefront_variance_tilt_removed[i]),
             ] {
-                let found = Derivatives::from(found);
-                pairs.push((found, found, exact));
+                pairs.push(FoundDerivatives::of_wavefront(found.into(), exact));
             }
         }
         pairs

@@ -393,7 +393,7 @@ impl<'a> Growth<'a> {
         let rays = &self.context.sampling.channels[wavelength].rays;
         let surfaces = channel.tracer.surfaces();
         let mut directions = ErrorDirections {
-            rows: ErrorRows::zeros(rays.len(), surfaces),
+            rows: ErrorRows::zeros(rays.len(), surfaces, 2),
             weights: channel.weights.iter().map(|w| 2.0 * w).collect(),
             slopes: [self.slope_factors(channel, 0), self.slope_factors(channel, 1)],
         };

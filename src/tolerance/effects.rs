@@ -16,7 +16,7 @@ use super::pupils::{FieldPupils, PupilTreatment, ScenePupils};
 use super::sensitivity::{RaySensitivity, Sensitivity, second_derivatives, sensitivities_until};
 use super::sweep::SweptField;
 use super::two_planes::TwoPlanes;
-use super::{StopTest, ToleranceError, ToleranceScene, refuse_if_stopped};
+use super::{FocusTreatment, StopTest, ToleranceError, ToleranceScene, refuse_if_stopped};
 use crate::lens::Perturbation;
 use crate::math::dot;
 use crate::pupil::EdgeRay;
@@ -273,8 +273,12 @@ impl RayEffects {
         self.focus
     }
 
-    /// The second derivatives of the mean square at the image plane (0) or at the best focus (1).
-    pub(super) fn second(&self, plane: usize) -> Option<Vec<f64>> {
+    /// The second derivatives of the mean square at an image plane.
+    pub(super) fn second(&self, focus: FocusTreatment) -> Option<Vec<f64>> {
+        let plane = match focus {
+            FocusTreatment::Fixed => 0,
+            FocusTreatment::Refocused => 1,
+        };
         Some(self.second.as_ref()?.iter().map(|both| both[plane]).collect())
     }
 
@@ -547,10 +551,9 @@ impl EffectProducts {
         let rows = field.offsets.len();
         let offsets = &field.offsets + shift * &field.slopes;
         let displaced = field.displaced((parities, compensation), shift, &offsets);
-        let columns = |range: Range<usize>| &displaced.values[range.start * rows..range.end * rows];
         for class in &displaced.classes {
-            let (own, count) = (columns(class.clone()), class.len());
-            let own = DMatrixView::from_slice(own, rows, count);
+            let own = &displaced.values[class.start * rows..class.end * rows];
+            let own = DMatrixView::from_slice(own, rows, class.len());
             let found = own.transpose() * own;
             let order = &displaced.order[class.clone()];
             for (j, to) in order.iter().enumerate() {
@@ -560,11 +563,11 @@ impl EffectProducts {
             }
         }
         if let Some(edge) = &field.edge {
-            let mut places = vec![0; parities.len()];
-            displaced.order.iter().enumerate().for_each(|(place, number)| places[*number] = place);
+            let mut columns: Vec<&[f64]> = vec![&[]; parities.len()];
+            let in_order = displaced.values.chunks(rows.max(1)).zip(&displaced.order);
+            in_order.for_each(|(column, number)| columns[*number] = column);
             let inner = field.inner(&parities[..numbers], &offsets);
-            self.edge
-                .add(edge, &inner, shift, |number| columns(places[number]..places[number] + 1));
+            self.edge.add(edge, &inner, shift, &columns);
         }
         let bends = field.bend.tr_mul(&offsets);
         for (m, parity) in parities[..numbers].iter().enumerate() {

@@ -30,6 +30,16 @@ pub enum FocusTreatment {
     Refocused,
 }
 
+impl FocusTreatment {
+    /// The displacement of the image plane of a lens without errors, in mm.
+    fn shift(self, effects: &RayEffects) -> f64 {
+        match self {
+            Self::Fixed => 0.0,
+            Self::Refocused => effects.focus(),
+        }
+    }
+}
+
 /// The mean square spot radius in mm² as a quadratic function of the errors.
 #[derive(Debug, Clone)]
 pub struct QuadraticForm {
@@ -132,8 +142,8 @@ impl AdjustedForm {
 impl QuadraticForm {
     /// The form of a lens from the effects of its errors.
     pub fn new(effects: &RayEffects, focus: FocusTreatment, compensation: &Compensation) -> Self {
-        let [moving, _] = Self::with_moving_and_held_pupils(effects, focus, compensation);
-        moving
+        let products = effects.products(compensation, focus.shift(effects));
+        Self::of((effects, &products, products.edge()), focus, compensation)
     }
 
     /// The form with the motion of the edges of pupils where it is known, and that with the pupils held.
@@ -142,19 +152,25 @@ impl QuadraticForm {
         focus: FocusTreatment,
         compensation: &Compensation,
     ) -> [Self; 2] {
-        let (shift, plane) = match focus {
-            FocusTreatment::Refocused => (effects.focus(), 1),
-            FocusTreatment::Fixed => (0.0, 0),
-        };
-        let products = effects.products(compensation, shift);
-        let held = EdgeProducts::none(effects.numbers());
-        [products.edge(), &held].map(|edge| {
-            let form = FixedForm::new(effects, (shift, plane), (&products, edge), compensation);
-            match focus {
-                FocusTreatment::Fixed => form.without_adjustment(),
-                FocusTreatment::Refocused => form.adjusted(&compensation.adjustments),
-            }
-        })
+        let products = effects.products(compensation, focus.shift(effects));
+        let of = |edge| Self::of((effects, &products, edge), focus, compensation);
+        let moving = of(products.edge());
+        if !effects.has_moving_pupils() {
+            return [moving.clone(), moving];
+        }
+        [moving, of(&EdgeProducts::none(effects.numbers()))]
+    }
+
+    fn of(
+        (effects, products, edge): (&RayEffects, &EffectProducts, &EdgeProducts),
+        focus: FocusTreatment,
+        compensation: &Compensation,
+    ) -> Self {
+        let form = FixedForm::new((effects, products, edge), focus, compensation);
+        match focus {
+            FocusTreatment::Fixed => form.without_adjustment(),
+            FocusTreatment::Refocused => form.adjusted(&compensation.adjustments),
+        }
     }
 
     /// The mean square spot radius of a lens with these errors, in mm²; a form knows no end at zero,
@@ -278,12 +294,10 @@ struct FixedForm {
 }
 
 impl FixedForm {
-    /// The form at a shift of the image plane, to which a second derivative belongs by number, from mean products
-    /// there and the addition by edges.
+    /// The form at an image plane from the mean products there and what edges of pupils add to them.
     fn new(
-        effects: &RayEffects,
-        (shift, plane): (f64, usize),
-        (products, edge): (&EffectProducts, &EdgeProducts),
+        (effects, products, edge): (&RayEffects, &EffectProducts, &EdgeProducts),
+        focus: FocusTreatment,
         compensation: &Compensation,
     ) -> Self {
         let (count, adjustments) = (effects.numbers(), compensation.adjustments.len());
@@ -297,9 +311,9 @@ impl FixedForm {
             first: DVector::from_fn(count, |m, _| first(m)),
             among: &held + 2.0 * &edge.among,
             held,
-            exact: effects.second(plane),
+            exact: effects.second(focus),
             combinations: ErrorCombinations::clone(effects.combinations()),
-            focus: shift,
+            focus: focus.shift(effects),
             by_adjustment: DVector::zeros(adjustments),
             by_both: DMatrix::zeros(adjustments, count),
             among_adjustments: DMatrix::zeros(adjustments, adjustments),

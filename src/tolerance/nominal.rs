@@ -75,6 +75,14 @@ impl ToleranceScene {
         Ok(Self { lens, beam, options, sampling_error: worst, pupils })
     }
 
+    /// The number of rays traced for a lens with errors, whose pupils are found anew if they are to move.
+    pub fn rays_of_real_lens(&self, moving_pupils: bool) -> usize {
+        match &self.pupils {
+            PupilTreatment::Known(pupils) if moving_pupils => pupils.rays_of_lens()[0],
+            _ => self.beam.rays(),
+        }
+    }
+
     /// The same with the rays of the lens as designed in all lenses with errors, whatever their rims.
     #[must_use]
     pub fn with_held_pupils(self) -> Self {

@@ -316,12 +316,12 @@ impl EdgeProducts {
 
     /// Adds the edge of a field at an image plane that is displaced by `shift`, where its inner rays are and have
     /// these displacements by each number.
-    pub(super) fn add<'a>(
+    pub(super) fn add(
         &mut self,
         edge: &FieldEdge,
         inner: &InnerRays<'_>,
         shift: f64,
-        displacement_by: impl Fn(usize) -> &'a [f64],
+        displacements: &[&[f64]],
     ) {
         let (squares, slopes) = edge.differences(inner, shift);
         let displaced = &edge.displacement + shift * &edge.bend;
@@ -331,7 +331,7 @@ impl EdgeProducts {
         for m in 0..numbers {
             let column = displaced.column(m);
             for (colour, range) in edge.colours.iter().enumerate() {
-                let mean = inner.mean_by(colour, m, displacement_by(m));
+                let mean = inner.mean_by(colour, m, displacements[m]);
                 for k in range.clone() {
                     by[(k, m)] = edge.product(offsets.as_slice(), column.as_slice(), k) - mean;
                 }

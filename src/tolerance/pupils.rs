@@ -7,7 +7,7 @@
 use super::{Beam, ColourRays, FieldBeam, NominalLens, ToleranceScene};
 use crate::lens::{FieldPoint, System};
 use crate::pupil::{EdgeRay, FixedLaunch, RayModel, Region, RegionKind};
-use crate::trace::{ImagePoints, RayLimit};
+use crate::trace::ImagePoints;
 use std::sync::Arc;
 
 /// The treatment of pupils in lenses with errors.
@@ -67,7 +67,7 @@ impl ColourPupil {
         }
         let traced = region.trace_whole_pupil(order);
         let edge = traced.edge_rays().unwrap_or_default();
-        if edge.iter().any(|ray| !is_of_rim(ray.limit)) {
+        if edge.iter().any(|ray| !ray.limit.is_edge_of_aperture()) {
             return Err("a pupil ends at a critical angle or beside a surface");
         }
         Ok(Self {
@@ -82,14 +82,6 @@ impl ColourPupil {
             rays: [traced.rays_traced - traced.rays.len(), traced.rays.len()],
         })
     }
-}
-
-/// True if a limit is the edge of an aperture: rays go on beyond it.
-fn is_of_rim(limit: RayLimit) -> bool {
-    matches!(
-        limit,
-        RayLimit::Rim | RayLimit::Obstruction | RayLimit::Aperture(_) | RayLimit::Obscuration(_)
-    )
 }
 
 impl FieldPupils {

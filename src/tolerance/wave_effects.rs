@@ -89,50 +89,43 @@ impl WaveNumbers {
     }
 }
 
-/// The wavefront of a lens at its image plane and at its best position, with its derivatives.
-pub(super) struct WaveEffects {
-    /// At the image plane and at the best position.
-    pub(super) planes: [LinearEffects; 2],
-}
-
-impl WaveEffects {
-    /// The wavefront of a lens of which the rays arrive so, with the best position of its image plane.
-    ///
-    /// # Errors
-    /// A ray that does not arrive, and [`ToleranceError::Stopped`] once `stop` says so.
-    pub(super) fn new(
-        (scene, beam): (&ToleranceScene, &WaveBeam),
-        numbers: &WaveNumbers,
-        (arrived, focus): (&[ArrivedField<f64>], f64),
-        stop: StopTest<'_>,
-    ) -> Result<Self, ToleranceError> {
-        let traced = match &numbers.source {
-            NumberSource::Traces(errors) => Some(traced_changes(scene, beam, errors, stop)?),
-            NumberSource::Sweep(_) => None,
+/// The wavefront of a lens of which the rays arrive so with its derivatives, at its image plane and at the best
+/// position of that.
+///
+/// # Errors
+/// A ray that does not arrive, and [`ToleranceError::Stopped`] once `stop` says so.
+pub(super) fn wave_effects(
+    (scene, beam): (&ToleranceScene, &WaveBeam),
+    numbers: &WaveNumbers,
+    (arrived, focus): (&[ArrivedField<f64>], f64),
+    stop: StopTest<'_>,
+) -> Result<[LinearEffects; 2], ToleranceError> {
+    let traced = match &numbers.source {
+        NumberSource::Traces(errors) => Some(traced_changes(scene, beam, errors, stop)?),
+        NumberSource::Sweep(_) => None,
+    };
+    let planes = TwoPlanes::new(scene, 0.0)?;
+    let field = |(i, arrived): (usize, &ArrivedField<f64>)| {
+        refuse_if_stopped(stop)?;
+        let changes = match (&numbers.source, &traced) {
+            (NumberSource::Sweep(numbers), _) => {
+                swept_changes((scene, &planes, beam), (i, arrived), numbers)?
+            }
+            (NumberSource::Traces(_), traced) => traced
+                .iter()
+                .flatten()
+                .map(|changes| changes[i].clone())
+                .collect::<Vec<RayChanges>>(),
         };
-        let planes = TwoPlanes::new(scene, 0.0)?;
-        let field = |(i, arrived): (usize, &ArrivedField<f64>)| {
-            refuse_if_stopped(stop)?;
-            let changes = match (&numbers.source, &traced) {
-                (NumberSource::Sweep(numbers), _) => {
-                    swept_changes((scene, &planes, beam), (i, arrived), numbers)?
-                }
-                (NumberSource::Traces(_), traced) => traced
-                    .iter()
-                    .flatten()
-                    .map(|changes| changes[i].clone())
-                    .collect::<Vec<RayChanges>>(),
-            };
-            Ok([0.0, focus].map(|plane| FieldWaves::new((beam, i), arrived, &changes, plane)))
-        };
-        let fields = arrived.par_iter().enumerate().map(field);
-        let fields: Vec<[FieldWaves; 2]> = fields.collect::<Result<_, ToleranceError>>()?;
-        let of = |plane: usize| {
-            let fields: Vec<&FieldWaves> = fields.iter().map(|both| &both[plane]).collect();
-            linear_effects(&fields, numbers, [0.0, focus][plane])
-        };
-        Ok(Self { planes: [of(0), of(1)] })
-    }
+        Ok([0.0, focus].map(|plane| FieldWaves::new((beam, i), arrived, &changes, plane)))
+    };
+    let fields = arrived.par_iter().enumerate().map(field);
+    let fields: Vec<[FieldWaves; 2]> = fields.collect::<Result<_, ToleranceError>>()?;
+    let of = |plane: usize| {
+        let fields: Vec<&FieldWaves> = fields.iter().map(|both| &both[plane]).collect();
+        linear_effects(&fields, numbers, [0.0, focus][plane])
+    };
+    Ok([of(0), of(1)])
 }
 
 /// The changes of all fields by each error, by a trace for each.
@@ -256,12 +249,16 @@ impl ArrivedField<f64> {
     /// The rays with their derivatives by a number.
     fn changed(&self, changes: &RayChanges) -> ArrivedField<Jet2> {
         let along = |value: f64, slope: f64| Jet2::constant(Dual { value, slope: [slope] });
-        let mut changed = self.map(Jet2::from_f64);
-        changed.image = along(self.image, changes.image);
-        for ((to, ray), by) in changed.rays.iter_mut().zip(&self.rays).zip(&changes.rays) {
-            *to = std::array::from_fn(|i| along(ray[i], by[i]));
+        let both = self.rays.iter().zip(&changes.rays);
+        let ray = |(ray, by): (&WaveRay<f64>, &WaveRay<f64>)| {
+            std::array::from_fn(|i| along(ray[i], by[i]))
+        };
+        ArrivedField {
+            rays: both.map(ray).collect(),
+            sense: self.sense,
+            index: Jet2::from_f64(self.index),
+            image: along(self.image, changes.image),
         }
-        changed
     }
 }
 

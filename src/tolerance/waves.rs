@@ -12,7 +12,7 @@ use super::effects::different_errors;
 use super::form::growth_shares;
 use super::sensitivity::Stages;
 use super::wave_beam::{ArrivedField, WaveBeam};
-use super::wave_effects::{WaveEffects, WaveNumbers};
+use super::wave_effects::{WaveNumbers, wave_effects};
 use super::{
     Beam, Derivatives, Jet2, Merits, NominalLens, QuadraticForm, RealMerit, RealMeritRequest,
     SecondDerivatives, StopTest, ToleranceError, ToleranceScene, form_spots, perturb,
@@ -49,8 +49,8 @@ impl WavefrontModel {
         let arrived = beam.trace(&scene.lens.systems)?;
         let focus = best_plane(&beam, &arrived);
         let numbers = WaveNumbers::new(scene, sheet)?;
-        let effects = WaveEffects::new((scene, &beam), &numbers, (&arrived, focus), stop)?;
-        let [mut near, mut best] = effects.planes;
+        let effects = wave_effects((scene, &beam), &numbers, (&arrived, focus), stop)?;
+        let [mut near, mut best] = effects;
         if second == SecondDerivatives::Traced {
             let errors: Vec<Perturbation> = sheet.errors.iter().map(|own| own.error).collect();
             near.exact = Some(second_derivatives((scene, &beam), &errors, 0.0, stop)?);

@@ -40,13 +40,18 @@ impl<R: Real> Tracer<R> {
     /// The margin of a ray at one limit, regardless of the rims in front; `None` for a ray that does
     /// not get there.
     pub fn margin(&self, ray: Ray<R>, surface: usize, limit: RayLimit) -> Option<R> {
-        let apertures = self.apertures.of(surface);
+        Some(self.arrived(ray, surface)?.margin(limit, self.apertures.of(surface)))
+    }
+
+    /// A ray where it meets a surface; `None` for one that does not get there.
+    #[inline(always)]
+    fn arrived(&self, ray: Ray<R>, surface: usize) -> Option<PropagatedRay<'_, R>> {
         if self.is_plain() {
             let (p, k) = self.state_before::<false>(ray, surface)?;
-            Some(self.propagate::<false>(surface, p, k).margin(limit, apertures))
+            Some(self.propagate::<false>(surface, p, k))
         } else {
             let (p, k) = self.state_before::<true>(ray, surface)?;
-            Some(self.propagate::<true>(surface, p, k).margin(limit, apertures))
+            Some(self.propagate::<true>(surface, p, k))
         }
     }
 
@@ -62,13 +67,7 @@ impl<R: Real> Tracer<R> {
         if !self.grin_gaps.is_empty() {
             return None;
         }
-        let arrived = if self.is_plain() {
-            let (p, k) = self.state_before::<false>(ray, surface)?;
-            self.propagate::<false>(surface, p, k)
-        } else {
-            let (p, k) = self.state_before::<true>(ray, surface)?;
-            self.propagate::<true>(surface, p, k)
-        };
+        let arrived = self.arrived(ray, surface)?;
         let Interface { rim2, obstruction2, .. } = rims.interfaces[surface];
         let clipping = Interface {
             rim2: R::from_f64(rim2),

@@ -45,6 +45,12 @@ impl RayLimit {
     pub fn may_hide_light(self) -> bool {
         self.is_shadow() || matches!(self, Self::Aperture(_))
     }
+
+    /// True if the limit is the edge of an aperture, which follows from the point on the surface alone: rays go on
+    /// beyond it in a lens without apertures.
+    pub fn is_edge_of_aperture(self) -> bool {
+        matches!(self, Self::Rim | Self::Obstruction | Self::Aperture(_) | Self::Obscuration(_))
+    }
 }
 
 impl<R: Real> Tracer<R> {

@@ -2,8 +2,9 @@
 //!
 //! The search for the edge of a pupil asks for a few dozen rays at a time. In small blocks these take
 //! the vector instructions that trace a bundle; every number has the same bits as that of a single
-//! ray. The margins at a rim or an obstruction follow from the point alone; those at other limits, and
-//! all in GRIN media and on freeforms, are computed ray by ray.
+//! ray. The margins at a rim or an obstruction follow from the point alone; those at other limits, all
+//! in GRIN media, on freeforms and ideal surfaces, and those over dual numbers of surfaces that are not centred,
+//! are computed ray by ray.
 
 use super::aperture::ApertureSet;
 use super::batch::{RayBlock, Rays, SMALL_BLOCK};
@@ -31,21 +32,12 @@ impl<R: Real> Tracer<R> {
             |block, count| {
                 let lost = block.code;
                 let mut lanes = [R::ZERO; SMALL_BLOCK];
-                match self.vector_mount(surface) {
-                    Some(mount) => block.cross_mounted_open(
-                        last,
-                        surface as u32,
-                        mount,
-                        #[inline(always)]
-                        |j, met| lanes[j] = last.plain_margin(limit, met.point, apertures),
-                    ),
-                    None => block.cross_with(
-                        &last.open(),
-                        surface as u32,
-                        #[inline(always)]
-                        |j, met| lanes[j] = last.plain_margin(limit, met.point, apertures),
-                    ),
-                }
+                self.cross_one_open(
+                    block,
+                    surface,
+                    #[inline(always)]
+                    |j, met| lanes[j] = last.plain_margin(limit, met.point, apertures),
+                );
                 let nan = R::from_f64(f64::NAN);
                 margins.extend((0..count).map(|j| R::select(lost[j] > R::ZERO, nan, lanes[j])));
             },
@@ -74,7 +66,7 @@ impl<R: Real> Tracer<R> {
     /// blocks of rays cross between homogeneous media.
     fn has_block_margin(&self, limit: RayLimit) -> bool {
         let is_block_surface = |i: usize| !self.is_general(i) || self.vector_mount(i).is_some();
-        is_point_limit(limit) && (0..self.surfaces()).all(is_block_surface)
+        limit.is_edge_of_aperture() && (0..self.surfaces()).all(is_block_surface)
     }
 
     /// Traces rays to behind the first `count` surfaces, whose rims and obstructions clip nothing, and
@@ -104,21 +96,25 @@ impl<R: Real> Tracer<R> {
     /// Takes a block across the first surfaces, without their rims and obstructions.
     #[inline(always)]
     fn cross_open(&self, block: &mut RayBlock<R, SMALL_BLOCK>, surfaces: usize) {
-        for (i, interface) in self.interfaces[..surfaces].iter().enumerate() {
-            match self.vector_mount(i) {
-                Some(mount) => block.cross_mounted_open(interface, i as u32, mount, |_, _| {}),
-                None => block.cross_with(&interface.open(), i as u32, |_, _| {}),
-            }
+        for i in 0..surfaces {
+            self.cross_one_open(block, i, |_, _| {});
         }
     }
-}
 
-/// True if the margin at a limit follows from the point on the surface alone.
-fn is_point_limit(limit: RayLimit) -> bool {
-    matches!(
-        limit,
-        RayLimit::Rim | RayLimit::Obstruction | RayLimit::Aperture(_) | RayLimit::Obscuration(_)
-    )
+    /// Takes a block across a surface without its rim and obstruction, and hands over where its rays meet it.
+    #[inline(always)]
+    fn cross_one_open(
+        &self,
+        block: &mut RayBlock<R, SMALL_BLOCK>,
+        surface: usize,
+        keep: impl FnMut(usize, &Intersection<R>),
+    ) {
+        let (interface, number) = (&self.interfaces[surface], surface as u32);
+        match self.vector_mount(surface) {
+            Some(mount) => block.cross_mounted_open(interface, number, mount, keep),
+            None => block.cross_with(&interface.open(), number, keep),
+        }
+    }
 }
 
 impl<R: Real> RayBlock<R, SMALL_BLOCK> {
@@ -150,7 +146,7 @@ impl Tracer<f64> {
         rays: &Rays<f64>,
         weights: &[f64],
     ) -> Option<SystemGradient<f64>> {
-        if !self.is_plain() || !is_point_limit(limit) {
+        if !self.is_plain() || !limit.is_edge_of_aperture() {
             return None;
         }
         let outwards = if limit == RayLimit::Rim { -2.0 } else { 2.0 };

@@ -134,6 +134,7 @@ fn strehl_of_all(
     })?;
     if let [only] = colors.parts.as_slice()
         && colors.refused_share == 0.0
+        && about_sphere(&only.found.sphere, origin, [0.0; 3]) == [0.0; 3]
     {
         return Ok(only.found.strehl());
     }

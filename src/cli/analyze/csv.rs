@@ -19,7 +19,8 @@ pub(super) fn csv(report: &Value) -> String {
     }
     let mut scales: BTreeMap<String, f64> = BTreeMap::new();
     for Row { key, value, .. } in &rows {
-        if let Some(number) = value.as_f64() {
+        let is_alike = !key.split('.').any(|part| NOT_ALIKE.contains(&part));
+        if let Some(number) = value.as_f64().filter(|_| is_alike) {
             let scale = scales.entry(kind(key)).or_default();
             *scale = scale.max(number.abs());
         }
@@ -58,6 +59,9 @@ fn kind(key: &str) -> String {
     };
     key.split('.').map(part).collect::<Vec<_>>().join(".")
 }
+
+/// Names of numbers of which a large one tells nothing about the rounding of the others.
+const NOT_ALIKE: [&str; 3] = ["focal_length", "focus", "matrix"];
 
 fn cell(value: &Value, scale: f64) -> String {
     match value {
@@ -116,6 +120,7 @@ mod tests {
             "points": [{"x": -3.8e-18, "y": 0.02}, {"x": 1e-9, "y": -0.01}],
             "centroid_x": {"value": -3.8e-18, "error": 2e-15, "rays": 40},
             "rms": {"value": 2e-18, "error": 1e-20, "rays": 40},
+            "ghosts": [{"focal_length": 1e17}, {"focal_length": 100.0}],
             "fates": {"imaged": 0, "missed": 3}}]});
         let rows = csv(&report);
         for row in [
@@ -125,6 +130,7 @@ mod tests {
             "centroid_x.value,0\r\n",
             "centroid_x.error,2e-15\r\n",
             "rms.value,2e-18\r\n",
+            "ghosts.1.focal_length,100.0\r\n",
             "fates.imaged,0\r\n",
         ] {
             assert!(rows.contains(row), "{row} in {rows}");

@@ -113,6 +113,7 @@ fn agree_with_reference(path: &Path, samples: usize, output: &Output) -> Result<
     let wrong = |why: &dyn Display| CliError::Input(format!("{file}: {why}"));
     let text = std::fs::read_to_string(path).map_err(|why| wrong(&why))?;
     let reference: ToleranceReference = serde_json::from_str(&text).map_err(|why| wrong(&why))?;
+    reference.check().map_err(|why| wrong(&why))?;
     let stop = stop_flag();
     let mut lenses = Vec::new();
     for lens in &reference.lenses {

@@ -44,6 +44,11 @@ impl<'a> ImageLens<'a> {
             (found < count).then_some(found).ok_or_else(refuse)
         };
         let (primary, stop) = (within(&primary, colors.len())?, within(&stop, rows.len())?);
+        let weights = entry.get("weights");
+        if weights.list()?.len() != colors.len() {
+            let text = format!("{} numbers", colors.len());
+            return Err(ImageFileError::new(&weights.place, text));
+        }
         Ok(Self { id: entry.get("id").text()?, primary, stop, entry })
     }
 

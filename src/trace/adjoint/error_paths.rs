@@ -12,12 +12,10 @@ use super::errors::{AdjointColumns, ErrorNumber, ErrorRows, add_lanes};
 use crate::trace::Tracer;
 use crate::trace::batch::Rays;
 
-/// The paths of rays and their derivatives by errors of making.
+/// The derivatives of the optical paths of rays by errors of making.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorPaths {
-    /// The optical path of each ray to the image plane, in mm.
-    pub paths: Vec<f64>,
-    /// For each number its derivative where the end of the ray is held in the frame of the image plane.
+    /// For each number that where the end of the ray is held in the frame of the image plane.
     rows: ErrorRows,
 }
 
@@ -29,33 +27,26 @@ impl ErrorPaths {
 }
 
 impl Tracer<f64> {
-    /// The optical paths of rays that all arrive, with their derivatives by errors of making; zeros for a
-    /// lens without them ([`Tracer::has_error_slopes`]).
+    /// The derivatives of the optical paths of rays that all arrive by errors of making; zeros for a lens
+    /// without them ([`Tracer::has_error_slopes`]).
     pub fn error_paths(&self, rays: &Rays<f64>) -> ErrorPaths {
-        let rows = ErrorRows::zeros(rays.len(), self.surfaces());
-        let mut found = ErrorPaths { paths: vec![0.0; rays.len()], rows };
+        let rows = ErrorRows::zeros(rays.len(), self.surfaces(), 1);
+        let mut found = ErrorPaths { rows };
         let mut tape = self.empty_tape();
         self.visit_lanes(
             rays,
             #[inline(always)]
-            |traced| self.lane_paths(traced, &mut tape, &mut found),
+            |traced| self.lane_paths(traced, &mut tape, &mut found.rows),
         );
         found
     }
 
     #[inline(always)]
-    fn lane_paths(
-        &self,
-        traced: &TracedLanes,
-        tape: &mut [HitColumns<f64>],
-        found: &mut ErrorPaths,
-    ) {
+    fn lane_paths(&self, traced: &TracedLanes, tape: &mut [HitColumns<f64>], rows: &mut ErrorRows) {
         self.record(traced, |_| ErrorColumns::NONE, tape);
-        let rows = &mut found.rows;
         for (i, interface) in self.interfaces.iter().enumerate() {
             let index = interface.index_before;
             let way = tape[i].s.map(|s| s * index);
-            add_lanes(&mut found.paths, &way.map(|way| way * index), traced.lane);
             if let Some(medium) = interface.medium_before {
                 add_lanes(rows.row_mut(0, medium, ErrorNumber::Index), &way, traced.lane);
             }

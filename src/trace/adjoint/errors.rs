@@ -78,9 +78,9 @@ pub struct ErrorRows {
 }
 
 impl ErrorRows {
-    /// Zeros for some rays through a system of this many surfaces.
-    pub fn zeros(rays: usize, surfaces: usize) -> Self {
-        Self { rays, surfaces, values: vec![0.0; 2 * surfaces * ErrorNumber::COUNT * rays] }
+    /// Zeros for some rays through a system of this many surfaces, for this many axes.
+    pub fn zeros(rays: usize, surfaces: usize, axes: usize) -> Self {
+        Self { rays, surfaces, values: vec![0.0; axes * surfaces * ErrorNumber::COUNT * rays] }
     }
 
     fn start(&self, axis: usize, surface: usize, number: ErrorNumber) -> usize {
@@ -267,7 +267,7 @@ impl Tracer<f64> {
     /// The landings of rays that all arrive, with their derivatives by errors of making; zeros for a
     /// lens without them ([`Tracer::has_error_slopes`]).
     pub fn error_slopes(&self, rays: &Rays<f64>) -> ErrorSlopes {
-        let rows = ErrorRows::zeros(rays.len(), self.surfaces());
+        let rows = ErrorRows::zeros(rays.len(), self.surfaces(), 2);
         let column = || vec![0.0; rays.len()];
         let mut found = ErrorSlopes { slopes: [column(), column()], rows };
         let mut tape = self.empty_tape();

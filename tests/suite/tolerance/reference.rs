@@ -133,3 +133,38 @@ fn the_program_compares_itself_with_exact_answers() {
     assert_eq!(table.matches("broken").count(), 2, "{table}");
     assert!(error.contains("answers differ by more than their bounds"), "{error}");
 }
+
+/// A file of exact answers whose lists are too short, or count what is not there, is refused by name.
+#[test]
+fn a_file_of_exact_answers_is_checked() {
+    let mut file = read("tolerances.json");
+    file["lenses"].as_array_mut().unwrap().truncate(1);
+    let refused = |change: &dyn Fn(&mut Value)| {
+        let mut file = file.clone();
+        change(&mut file["lenses"][0]);
+        let text = serde_json::to_string(&file).unwrap();
+        let scratch = Scratch::with("short_tolerances.json", &text);
+        let output = aplanat(&["measure", "tolerance", "--reference", scratch.path()], "");
+        assert_eq!(output.status.code(), Some(2));
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let cut = |list: &mut Value| {
+        list.as_array_mut().unwrap().pop();
+    };
+    for (what, change) in [
+        (
+            "n: found",
+            &(|lens: &mut Value| cut(&mut lens["surfaces"][1]["n"])) as &dyn Fn(&mut Value),
+        ),
+        ("primary: found 9", &|lens| lens["primary"] = 9.into()),
+        ("wavelength_weights: found", &|lens| cut(&mut lens["wavelength_weights"])),
+        ("mean_square: found", &|lens| cut(&mut lens["derivatives"][0]["mean_square"])),
+        ("merits: found", &|lens| cut(&mut lens["cases"][0]["merits"]["msc"])),
+        ("wavelength of a ray: found 7", &|lens| {
+            lens["cases"][0]["rays"][0]["wavelength"] = 7.into();
+        }),
+    ] {
+        let text = refused(change);
+        assert!(text.contains("cooke_triplet_100: ") && text.contains(what), "{text}");
+    }
+}
