@@ -116,7 +116,7 @@ fn trace_field<R: Real>(
     number: usize,
 ) -> Result<Vec<Landings<R>>, ToleranceError> {
     let colour = |colour: &super::ColourRays| {
-        let rays: Rays<R> = colour.rays.iter().map(|ray| ray.cast()).collect();
+        let rays: Rays<R> = colour.rays.iter().map(Ray::cast).collect();
         let mut landed = Landings::default();
         tracers[colour.wavelength].trace_batch(&rays, &mut landed);
         match (0..rays.len()).find(|ray| !landed.fate(*ray).is_imaged()) {
