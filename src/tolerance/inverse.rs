@@ -32,6 +32,11 @@ pub fn loosest_tolerances(
         let factor = widest(|factor| lenses.mean_square(factor) <= target);
         return Ok(widened(&shaped.errors, |_| factor));
     }
+    if total < 0.0 {
+        let text = "by the quadratic model the expected spot falls as the tolerances widen, so that none are the \
+                    loosest; expected pupils that are held or other tolerances";
+        return Err(ToleranceError::Other(text.to_owned()));
+    }
     let scale = if total > 0.0 { ((target - form.nominal) / total).sqrt() } else { 1.0 };
     Ok(widened(&sheet.errors, |i| factors[i] * scale))
 }
@@ -47,8 +52,9 @@ fn equal_costs(
     let costs: Vec<f64> = sheet.errors.iter().enumerate().map(cost).collect();
     let paid = costs.iter().filter(|cost| **cost > 0.0).count().max(1);
     let mean = costs.iter().filter(|cost| **cost > 0.0).sum::<f64>() / paid as f64;
+    // One that makes the spot smaller, as one that narrows a pupil may, is not free: wide, it would outweigh the others.
     let factor = |cost: &f64| {
-        if *cost > 0.0 { (mean / cost).sqrt().clamp(1.0 / MOST, MOST) } else { MOST }
+        if *cost == 0.0 { MOST } else { (mean / cost.abs()).sqrt().clamp(1.0 / MOST, MOST) }
     };
     let factors: Vec<f64> = costs.iter().map(factor).collect();
     let wider = ToleranceSheet { errors: widened(&sheet.errors, |i| factors[i]), ..sheet.clone() };
@@ -64,8 +70,9 @@ fn widened(tolerances: &[Tolerance], factor: impl Fn(usize) -> f64) -> Vec<Toler
 
 /// The number of lenses by the form from which a yield is told: its error is half a per cent.
 const LENSES: u64 = 8_000;
-/// The halvings of the range in which a factor is sought.
-const HALVINGS: usize = 40;
+/// The factor between those that are tried in turn, and the halvings of the range between two of them.
+const TRIED: f64 = 1.5;
+const HALVINGS: usize = 30;
 /// The factor up to which tolerances are widened or narrowed for a yield.
 const WIDEST: f64 = 1e4;
 
@@ -110,9 +117,13 @@ impl RandomLenses {
     }
 }
 
-/// The largest factor of tolerances that a condition permits.
+/// The largest factor of tolerances up to which a condition permits all smaller ones: a form that falls below 0
+/// far out permits larger ones too.
 fn widest(is_permitted: impl Fn(f64) -> bool) -> f64 {
-    let (mut low, mut high) = (1.0 / WIDEST, WIDEST);
+    let (mut low, mut high) = (1.0 / WIDEST, TRIED / WIDEST);
+    while high < WIDEST && is_permitted(high) {
+        (low, high) = (high, TRIED * high);
+    }
     for _ in 0..HALVINGS {
         let middle = (low * high).sqrt();
         if is_permitted(middle) { low = middle } else { high = middle }

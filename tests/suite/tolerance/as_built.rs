@@ -1,11 +1,12 @@
 //! Lenses that are made: expectations, quantiles, yields and gradients.
 
 use super::reference::{ToleranceCase, assert_close, kind, lenses, tolerances};
+use crate::merit::bundled;
 use crate::reference::{number, numbers};
-use aplanat::lens::{ErrorDistribution, Perturbation, ToleranceSheet};
+use aplanat::lens::{ErrorDistribution, Perturbation, ToleranceGrade, ToleranceSheet};
 use aplanat::tolerance::{
-    PupilTreatment, ToleranceRequest, ToleranceScene, analyze, as_built_gradient, form_yield,
-    loosest_for_yield, loosest_tolerances,
+    ErrorModel, PupilTreatment, SecondDerivatives, ToleranceRequest, ToleranceScene, analyze,
+    as_built_gradient, form_yield, graded_sheet, loosest_for_yield, loosest_tolerances,
 };
 
 /// The lens with the rays of the Monte Carlo of the file, or fewer.
@@ -132,6 +133,31 @@ fn the_loosest_tolerances_give_the_yield_that_was_asked_for() {
     for (limit, share) in [(0.5 * form.nominal.sqrt(), 0.9), (limit, 1.0)] {
         let refused = loosest_for_yield(form, &tight, limit, share).unwrap_err();
         assert!(refused.to_string().contains("expected more than"), "{refused}");
+    }
+}
+
+/// An error that makes the expected spot smaller, as by the motion of a pupil, does not outweigh the others however
+/// wide it is: the spot and the yield are those that were asked for.
+#[test]
+fn the_loosest_tolerances_count_errors_that_make_the_spot_smaller() {
+    let lens = bundled("cooke_triplet_100_f27");
+    let scene = ToleranceScene::new(&lens, 0, 1e-2).unwrap();
+    let sheet = graded_sheet(&lens, &scene.lens, ToleranceGrade::Precision);
+    let model = ErrorModel::new(&scene, &sheet, SecondDerivatives::Neglected, &|| false).unwrap();
+    assert!(model.pupils.moves);
+    let form = &model.forms[1];
+    assert!((0..sheet.errors.len()).any(|i| form.second.of(i, i) < 0.0));
+    for factor in [1.01, 1.2] {
+        let target = (factor * form.nominal.sqrt()).powi(2);
+        let loosest = loosest_tolerances(form, &sheet, target).unwrap();
+        let expected = form.expectation(&ToleranceSheet::of_errors(loosest)).unwrap();
+        assert_close(expected, target, 1e-9 * target, "expectation");
+    }
+    let limit = 1.002 * form.nominal.sqrt();
+    for share in [0.3, 0.6] {
+        let loosest =
+            ToleranceSheet::of_errors(loosest_for_yield(form, &sheet, limit, share).unwrap());
+        assert_close(form_yield(form, &loosest, limit).unwrap(), share, 2e-3, "yield");
     }
 }
 
