@@ -13,7 +13,8 @@ const MOST: f64 = 10.0;
 /// lenses by the form.
 ///
 /// # Errors
-/// A target that the lens without errors does not reach.
+/// A target that the lens without errors does not reach, and a form by which the expected spot falls as tolerances
+/// widen.
 pub fn loosest_tolerances(
     form: &QuadraticForm,
     sheet: &ToleranceSheet,
