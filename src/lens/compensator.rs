@@ -198,7 +198,13 @@ impl FromStr for Compensator {
             Some((first, last)) => (Some(number(first)?), Some(number(last)?)),
             None => (None, None),
         };
-        CompensatorJson { kind: *kind, first, last, travel }.try_into()
+        match (kind.perturbation(), first) {
+            (Some(_), None) => {
+                Err(format!("{name} without a surface; expected {name}@SURFACES=TRAVEL"))
+            }
+            (None, Some(_)) => Err(format!("{name} of a surface; expected {name}=TRAVEL")),
+            _ => CompensatorJson { kind: *kind, first, last, travel }.try_into(),
+        }
     }
 }
 

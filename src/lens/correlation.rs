@@ -68,6 +68,9 @@ fn pairs(
         if !(-1.0..=1.0).contains(coefficient) {
             return refuse(format!("a coefficient of {coefficient}; expected -1 to 1"));
         }
+        if errors.len() < 2 {
+            return refuse(format!("{} errors together; expected two or more", errors.len()));
+        }
         if errors.len() > MOST {
             return refuse(format!("{} errors together; expected at most {MOST}", errors.len()));
         }

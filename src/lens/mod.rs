@@ -78,7 +78,7 @@ pub use thermal::TemperatureChange;
 pub use tolerance::{ErrorDistribution, Tolerance, ToleranceGrade, ToleranceSheet};
 pub use tolerance_units::{
     StatedTolerances, TEST_WAVELENGTH, conic_of_sag, curvature_of_fringes, fourth_of_sag,
-    fringes_of_curvature,
+    fringes_of_curvature, sag_of_conic, sag_of_fourth,
 };
 pub use variables::{ParameterKind, add_variable, add_variables, at_zoom};
 pub use zoom::{ZoomNumber, ZoomPosition};

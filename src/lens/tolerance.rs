@@ -183,15 +183,23 @@ impl ToleranceSheet {
 
     /// Checks the numbers and that the surfaces exist; `surfaces` is their number.
     pub(super) fn check(&self, surfaces: usize) -> Result<(), LensError> {
-        for Tolerance { error, half_range, .. } in &self.errors {
-            let what = format_args!("half range of the error `{}`", error.kind.name());
+        for (place, Tolerance { error, half_range, .. }) in self.errors.iter().enumerate() {
+            let name = format!("errors[{place}] of the tolerances (`{}`)", error.kind.name());
+            let what = format_args!("half range of {name}");
             check_number(what, *half_range, *half_range >= 0.0, "zero or more")?;
-            if error.first > error.last || error.last >= surfaces {
-                let (first, last) = (error.first + 1, error.last + 1);
-                return Err(LensError::Inconsistent(format!(
-                    "the error `{}` names surfaces {first} to {last}; expected 1 to {surfaces}",
-                    error.kind.name()
-                )));
+            let (first, last) = (error.first + 1, error.last + 1);
+            let refuse = |expected: &str| {
+                let text = format!("{name} names surfaces {first} to {last}; expected {expected}");
+                Err(LensError::Inconsistent(text))
+            };
+            if first > last {
+                return refuse("the first one in front of the last one");
+            }
+            if last > surfaces {
+                return refuse(&format!("1 to {surfaces}"));
+            }
+            if first != last && !error.kind.moves_a_body() {
+                return refuse("one: `last` is for elements and groups");
             }
         }
         let travel = self.focus_travel.unwrap_or(0.0);

@@ -36,6 +36,16 @@ pub fn fourth_of_sag(sag: f64, semi_diameter: f64) -> f64 {
     sag / semi_diameter.powi(4)
 }
 
+/// The change of the sag in mm at a semi-diameter in mm by an error of the conic constant.
+pub fn sag_of_conic(conic: f64, curvature: f64, semi_diameter: f64) -> f64 {
+    conic * curvature.abs().powi(3) * semi_diameter.powi(4) / 8.0
+}
+
+/// The change of the sag in mm at a semi-diameter in mm by an error of the coefficient of r⁴ in mm⁻³.
+pub fn sag_of_fourth(fourth: f64, semi_diameter: f64) -> f64 {
+    fourth * semi_diameter.powi(4)
+}
+
 /// Tolerances as a file states them, with half ranges in any of the units.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -80,7 +90,11 @@ impl StatedTolerances {
     /// A half range that is stated twice or not at all, or one in a unit that its surface does not have, in
     /// words.
     pub fn resolved(self, rows: &[Row]) -> Result<ToleranceSheet, String> {
-        let errors = self.errors.iter().map(|stated| stated.resolved(rows));
+        let resolved = |(place, stated): (usize, &StatedTolerance)| {
+            let why = |why| format!("errors[{place}] of the tolerances: {why}");
+            stated.resolved(rows).map_err(why)
+        };
+        let errors = self.errors.iter().enumerate().map(resolved);
         Ok(ToleranceSheet {
             errors: errors.collect::<Result<_, _>>()?,
             focus_travel: self.focus_travel,
@@ -90,25 +104,25 @@ impl StatedTolerances {
     }
 }
 
+/// The keys of a half range, as an expectation.
+const HALF_RANGES: &str = "one of half_range, fringes, percent and sag";
+
 impl StatedTolerance {
     fn resolved(&self, rows: &[Row]) -> Result<Tolerance, String> {
         let Self { kind, first, last, distribution, .. } = *self;
         let refuse = |found: &str, expected: &str| {
             let name = kind.name();
             let surface = SurfaceNumber::new(first);
-            Err(format!(
-                "the tolerance `{name}` of surface {surface}: found {found}; expected {expected}"
-            ))
+            Err(format!("`{name}` of surface {surface}: found {found}; expected {expected}"))
         };
         let row = rows.get(first);
         let rim = row.and_then(|row| row.semi_diameter).filter(|rim| *rim > 0.0);
         let no_rim = || refuse("no semi-diameter of it", "one, or a `half_range`");
         let stated = [self.half_range, self.fringes, self.percent, self.sag];
-        if stated.iter().flatten().count() != 1 {
-            return refuse(
-                "no half range or several",
-                "one of half_range, fringes, percent and sag",
-            );
+        match stated.iter().flatten().count() {
+            0 => return refuse("no half range", HALF_RANGES),
+            1 => {}
+            _ => return refuse("several half ranges", HALF_RANGES),
         }
         let curvature = row.map_or(0.0, |row| row.curvature);
         let half_range = match (kind, stated) {

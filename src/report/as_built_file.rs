@@ -48,7 +48,10 @@ pub fn tolerance_table(
         let own = &sheet.errors[i];
         let TableUnit { name: unit, factor } = own.error.kind.table_unit();
         let distribution = serde_json::to_value(own.distribution).unwrap_or_default();
-        let [by, adjusted] = &analysis.forms;
+        let [by, adjusted] = analysis
+            .forms
+            .each_ref()
+            .map(|form| form.derivatives(i).without_rounding(own.deviation()));
         let cells = [
             own.error.kind.name().replace(',', ""),
             SurfaceNumber::new(own.error.first).to_string(),
@@ -57,11 +60,11 @@ pub fn tolerance_table(
             (factor * own.half_range).to_string(),
             (factor * own.deviation()).to_string(),
             distribution.as_str().unwrap_or_default().to_owned(),
-            (by.first[i] / factor).to_string(),
-            (by.second.of(i, i) / (factor * factor)).to_string(),
+            (by.first / factor).to_string(),
+            (by.second / (factor * factor)).to_string(),
             fixed.to_string(),
-            (adjusted.first[i] / factor).to_string(),
-            (adjusted.second.of(i, i) / (factor * factor)).to_string(),
+            (adjusted.first / factor).to_string(),
+            (adjusted.second / (factor * factor)).to_string(),
             refocused.to_string(),
         ];
         text.push_str(&cells.join(","));

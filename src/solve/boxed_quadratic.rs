@@ -31,6 +31,11 @@ impl BoxedQuadratic {
         self.ranges.iter().flatten().any(|end| end.is_finite())
     }
 
+    /// True if some variable may move up to an end of its range.
+    pub fn has_stops(&self) -> bool {
+        self.ranges.iter().any(|[low, high]| low < high && (low.is_finite() || high.is_finite()))
+    }
+
     /// The value at variables, for a centre.
     pub fn value(&self, variables: &[f64], center: &[f64]) -> f64 {
         let offsets: Vec<f64> = variables.iter().zip(center).map(|(y, c)| y - c).collect();
@@ -122,6 +127,30 @@ impl BoxedQuadratic {
         found.map(|(i, _)| i)
     }
 
+    /// The first and the second derivatives of the least value in the box by its centre: variables at an end of
+    /// their range stay there, the others follow.
+    pub fn derivatives_of_least(&self, center: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+        let y = self.minimum(center);
+        let first = DVector::from_iterator(y.len(), self.slope(&y, center).iter().map(|by| -by));
+        let is_inside = self.holds(center);
+        let is_held = |i: &usize| {
+            let [low, high] = self.ranges[*i];
+            low >= high || !is_inside && (y[*i] <= low || y[*i] >= high)
+        };
+        let (held, free): (Vec<usize>, Vec<usize>) = (0..y.len()).partition(is_held);
+        let part = |rows: &[usize], columns: &[usize]| {
+            DMatrix::from_fn(rows.len(), columns.len(), |i, j| self.matrix[(rows[i], columns[j])])
+        };
+        let both = part(&held, &free);
+        let following = &both * scaled_pseudoinverse(&part(&free, &free)) * both.transpose();
+        let own = part(&held, &held) - following;
+        let mut second = DMatrix::zeros(y.len(), y.len());
+        for (i, row) in held.iter().enumerate() {
+            held.iter().enumerate().for_each(|(j, column)| second[(*row, *column)] = own[(i, j)]);
+        }
+        (first, second)
+    }
+
     fn slope(&self, y: &[f64], center: &[f64]) -> Vec<f64> {
         let row = |i: usize| (0..y.len()).map(|j| self.matrix[(i, j)] * (y[j] - center[j])).sum();
         (0..y.len()).map(row).collect()
@@ -136,6 +165,9 @@ pub fn scaled_pseudoinverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
         if own > 0.0 { 1.0 / own.sqrt() } else { 0.0 }
     };
     let count = matrix.nrows();
+    if count == 0 {
+        return matrix.clone();
+    }
     let scaled = DMatrix::from_fn(count, count, |i, j| unit(i) * matrix[(i, j)] * unit(j));
     let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(scaled);
     let inverse = |m: usize| if eigenvalues[m] > SINGULAR { 1.0 / eigenvalues[m] } else { 0.0 };
@@ -148,6 +180,37 @@ pub fn scaled_pseudoinverse(matrix: &DMatrix<f64>) -> DMatrix<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Derivatives of the least value in boxes that hold one variable, both and none, by differences.
+    #[test]
+    fn derivatives_of_the_least_value_are_those_of_differences() {
+        let matrix = DMatrix::from_row_slice(2, 2, &[2.0, 0.5, 0.5, 1.0]);
+        let far = f64::INFINITY;
+        for (ranges, center) in [
+            ([[-1.0, 1.0], [-far, far]], [3.0, 0.2]),
+            ([[-1.0, 1.0], [-1.0, 1.0]], [3.0, 2.5]),
+            ([[-1.0, 1.0], [-1.0, 1.0]], [0.3, -0.2]),
+            ([[0.0, 0.0], [-far, far]], [0.0, 0.4]),
+            ([[0.0, 0.0], [0.0, 0.0]], [0.1, 0.4]),
+        ] {
+            let quadratic = BoxedQuadratic::new(matrix.clone(), ranges.to_vec());
+            let least = |at: [f64; 2]| quadratic.value(&quadratic.minimum(&at), &at);
+            let (first, second) = quadratic.derivatives_of_least(&center);
+            let step = 1e-3;
+            let moved = |i: usize, by: f64| {
+                let mut at = center;
+                at[i] += by;
+                at
+            };
+            for i in 0..2 {
+                let slope = (least(moved(i, step)) - least(moved(i, -step))) / (2.0 * step);
+                assert!((first[i] - slope).abs() < 1e-9, "{ranges:?} {i}: {} {slope}", first[i]);
+                let twice = least(moved(i, step)) + least(moved(i, -step)) - 2.0 * least(center);
+                let curvature = twice / (step * step);
+                assert!((second[(i, i)] - curvature).abs() < 1e-6, "{ranges:?} {i}: {second}");
+            }
+        }
+    }
 
     fn function(entries: &[f64], ranges: &[[f64; 2]]) -> BoxedQuadratic {
         let count = ranges.len();

@@ -608,6 +608,11 @@ impl EffectProducts {
         self.with_slopes(self.products.ncols() - 2)
     }
 
+    /// The mean product of slopes and distances from the centroids, in mm.
+    pub(super) fn offsets_with_slopes(&self) -> f64 {
+        self.with_offsets(self.products.ncols() - 2)
+    }
+
     /// The mean square of the distances from the centroids, in mm².
     pub(super) fn offsets(&self) -> f64 {
         self.with_offsets(self.products.ncols() - 1)

@@ -10,12 +10,12 @@
 //! All errors are combinations of few numbers of the lens: the form is one of these, as large as the
 //! lens however many errors there are.
 
-use super::ToleranceError;
 use super::compensation::Compensation;
 use super::effects::{EffectProducts, ErrorCombinations, RayEffects};
 use super::mixture::ErrorMixture;
 use super::pupil_edge::EdgeProducts;
 use super::reduced::ReducedForm;
+use super::{Derivatives, ToleranceError};
 use crate::lens::{Compensator, ToleranceSheet};
 use crate::solve::{BoxedQuadratic, scaled_pseudoinverse};
 use nalgebra::{DMatrix, DVector};
@@ -32,10 +32,11 @@ pub enum FocusTreatment {
 
 impl FocusTreatment {
     /// The displacement of the image plane of a lens without errors, in mm.
-    fn shift(self, effects: &RayEffects) -> f64 {
+    fn shift(self, effects: &RayEffects, compensation: &Compensation) -> f64 {
+        let travel = compensation.adjustments[0].travel;
         match self {
             Self::Fixed => 0.0,
-            Self::Refocused => effects.focus(),
+            Self::Refocused => effects.focus().clamp(-travel, travel),
         }
     }
 }
@@ -142,7 +143,7 @@ impl AdjustedForm {
 impl QuadraticForm {
     /// The form of a lens from the effects of its errors.
     pub fn new(effects: &RayEffects, focus: FocusTreatment, compensation: &Compensation) -> Self {
-        let products = effects.products(compensation, focus.shift(effects));
+        let products = effects.products(compensation, focus.shift(effects, compensation));
         Self::of((effects, &products, products.edge()), focus, compensation)
     }
 
@@ -152,7 +153,7 @@ impl QuadraticForm {
         focus: FocusTreatment,
         compensation: &Compensation,
     ) -> [Self; 2] {
-        let products = effects.products(compensation, focus.shift(effects));
+        let products = effects.products(compensation, focus.shift(effects, compensation));
         let of = |edge| Self::of((effects, &products, edge), focus, compensation);
         let moving = of(products.edge());
         if !effects.has_moving_pupils() {
@@ -188,32 +189,92 @@ impl QuadraticForm {
         self.nominal.max(0.0) + self.adjusted.as_ref().map_or(0.0, cost)
     }
 
-    /// True if the travel of a compensator has an end. The form is no quadratic one then, and its expectation is that
-    /// of compensators without one.
+    /// The derivatives of the mean square by an error of the lens as designed, of which compensators at the ends of
+    /// their travel stay there.
+    pub fn derivatives(&self, error: usize) -> Derivatives {
+        let value = self.as_designed();
+        let (mut first, mut second) = (self.first[error], self.second.of(error, error));
+        if let Some(adjusted) = &self.adjusted {
+            let (slope, curvature) = adjusted.travel.derivatives_of_least(&adjusted.nominal);
+            let best = adjusted.first.column(error);
+            first += slope.dot(&best);
+            second += best.dot(&(curvature * best));
+        }
+        Derivatives { value, first, second }
+    }
+
+    /// True if a compensator may travel to a stop. The form is no quadratic one then.
     pub fn has_stops(&self) -> bool {
-        self.adjusted.as_ref().is_some_and(|adjusted| adjusted.travel.is_bounded())
+        self.adjusted.as_ref().is_some_and(|adjusted| adjusted.travel.has_stops())
     }
 
     /// The growth of the expected mean square spot radius by each error in mm², half of what it shares
-    /// with others included, with compensators whose travel has no end.
+    /// with others included.
+    ///
+    /// Where compensators may end at stops, it is `½ σ² E[∂²S/∂p²]` as the mean over all errors from none to those of
+    /// the tolerances (Price, IRE Trans. Inf. Theory 4 (1958) 69: exact for normal errors), with stops by random
+    /// lenses, to about 1 %.
     ///
     /// # Errors
     /// Correlations that no errors can have.
     pub fn growth(&self, sheet: &ToleranceSheet) -> Result<Vec<f64>, ToleranceError> {
         let mixture = ErrorMixture::new(sheet)?;
-        let of = |i: usize| {
-            let covariances = mixture.covariances(i).iter();
-            0.5 * covariances.map(|(j, value)| value * self.second.of(i, *j)).sum::<f64>()
-        };
-        Ok((0..sheet.errors.len()).map(of).collect())
+        Ok(self.growth_with_stops(&mixture, self.stop_curvature(sheet)?.as_ref()))
     }
 
-    /// The expected mean square spot radius in mm², with compensators whose travel has no end.
+    /// The expected mean square spot radius in mm². Compensators that may end at a stop count as if they had none.
     ///
     /// # Errors
     /// Correlations that no errors can have.
     pub fn expectation(&self, sheet: &ToleranceSheet) -> Result<f64, ToleranceError> {
-        Ok(self.nominal + self.growth(sheet)?.iter().sum::<f64>())
+        let mixture = ErrorMixture::new(sheet)?;
+        let (nominal, held) = if self.has_stops() {
+            (self.nominal, None)
+        } else {
+            (self.as_designed(), self.held_curvature())
+        };
+        let growth = self.growth_with_stops(&mixture, held.as_ref());
+        Ok(nominal + growth.iter().sum::<f64>())
+    }
+
+    /// The second derivatives by the best adjustments of the mean square that stops cost, as the mean over lenses
+    /// with random errors; `None` where nothing has one.
+    pub(super) fn stop_curvature(
+        &self,
+        sheet: &ToleranceSheet,
+    ) -> Result<Option<DMatrix<f64>>, ToleranceError> {
+        if !self.has_stops() {
+            return Ok(self.held_curvature());
+        }
+        self.reduced(sheet)?.stop_curvature(&sheet.errors)
+    }
+
+    /// The same where compensators have unlimited travels or none.
+    fn held_curvature(&self) -> Option<DMatrix<f64>> {
+        let adjusted = self.adjusted.as_ref().filter(|own| own.travel.is_bounded())?;
+        Some(adjusted.travel.derivatives_of_least(&adjusted.nominal).1)
+    }
+
+    /// The second derivative by two errors with such second derivatives by the best adjustments.
+    pub(super) fn second_with_stops(
+        &self,
+        (i, j): (usize, usize),
+        stops: Option<&DMatrix<f64>>,
+    ) -> f64 {
+        let cost = self.adjusted.as_ref().zip(stops).map_or(0.0, |(adjusted, stops)| {
+            adjusted.first.column(i).dot(&(stops * adjusted.first.column(j)))
+        });
+        self.second.of(i, j) + cost
+    }
+
+    fn growth_with_stops(&self, mixture: &ErrorMixture, stops: Option<&DMatrix<f64>>) -> Vec<f64> {
+        let of = |i: usize| {
+            let covariances = mixture.covariances(i).iter();
+            let product =
+                |(j, value): &(usize, f64)| value * self.second_with_stops((i, *j), stops);
+            0.5 * covariances.map(product).sum::<f64>()
+        };
+        (0..self.first.len()).map(of).collect()
     }
 
     /// The form in few combinations of the errors that carry nearly all of it.
@@ -221,6 +282,9 @@ impl QuadraticForm {
         Ok(ReducedForm::new(self, &ErrorMixture::new(sheet)?))
     }
 }
+
+/// A growth below this share of the mean square is rounding, of which nothing has a share.
+const ROUNDING: f64 = 1e-12;
 
 /// The share of each error in the growth of the expectation of each form; correlated errors share what they do
 /// together.
@@ -233,8 +297,11 @@ pub(super) fn growth_shares(
 ) -> Result<Vec<[f64; 2]>, ToleranceError> {
     let [fixed, adjusted] = forms.each_ref().map(|form| form.growth(sheet));
     let (fixed, adjusted) = (fixed?, adjusted?);
-    let total = |growth: &[f64]| growth.iter().sum::<f64>().abs().max(f64::MIN_POSITIVE);
-    let totals = [total(&fixed), total(&adjusted)];
+    let total = |form: &QuadraticForm, growth: &[f64]| {
+        let rounding = ROUNDING * form.as_designed().max(f64::MIN_POSITIVE);
+        growth.iter().sum::<f64>().abs().max(rounding)
+    };
+    let totals = [total(&forms[0], &fixed), total(&forms[1], &adjusted)];
     let pairs = fixed.into_iter().zip(adjusted);
     Ok(pairs.map(|(a, b)| [a / totals[0], b / totals[1]]).collect())
 }
@@ -268,8 +335,7 @@ impl LinearEffects {
         FixedForm::of_effects(self).without_adjustment()
     }
 
-    /// The form with all compensators adjusted, focus first, where these effects are those at its best position
-    /// without errors.
+    /// The form with all compensators adjusted, focus first.
     pub(super) fn adjusted(self, adjustments: &[Compensator]) -> QuadraticForm {
         FixedForm::of_effects(self).adjusted(adjustments)
     }
@@ -285,7 +351,7 @@ struct FixedForm {
     /// The second derivative of the mean square by each error with the pupils held, where it is known.
     exact: Option<Vec<f64>>,
     combinations: ErrorCombinations,
-    /// The best focus without errors, in mm from the image plane.
+    /// The position of these numbers, in mm from the image plane.
     focus: f64,
     /// The derivatives by compensators: alone, with the numbers, and with each other.
     by_adjustment: DVector<f64>,
@@ -311,9 +377,13 @@ impl FixedForm {
             first: DVector::from_fn(count, |m, _| first(m)),
             among: &held + 2.0 * &edge.among,
             held,
-            exact: effects.second(focus),
+            exact: effects.second(if focus.shift(effects, compensation) == 0.0 {
+                FocusTreatment::Fixed
+            } else {
+                focus
+            }),
             combinations: ErrorCombinations::clone(effects.combinations()),
-            focus: focus.shift(effects),
+            focus: focus.shift(effects, compensation),
             by_adjustment: DVector::zeros(adjustments),
             by_both: DMatrix::zeros(adjustments, count),
             among_adjustments: DMatrix::zeros(adjustments, adjustments),
@@ -321,6 +391,7 @@ impl FixedForm {
         for m in 0..count {
             form.by_both[(0, m)] = 2.0 * by_focus(m);
         }
+        form.by_adjustment[0] = 2.0 * products.offsets_with_slopes();
         form.among_adjustments[(0, 0)] = 2.0 * products.slopes();
         for a in 1..adjustments {
             let own = count + a - 1;
@@ -356,8 +427,7 @@ impl FixedForm {
         };
         form.held = form.among.clone();
         for (a, column) in columns().enumerate() {
-            // The focus is at its best without errors.
-            form.by_adjustment[a] = if a == 0 { 0.0 } else { 2.0 * column.dot(&offsets) };
+            form.by_adjustment[a] = 2.0 * column.dot(&offsets);
             form.by_both.set_row(a, &(2.0 * numbers.tr_mul(column)).transpose());
             for (b, other) in columns().enumerate() {
                 form.among_adjustments[(a, b)] = 2.0 * column.dot(other);

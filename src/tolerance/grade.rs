@@ -6,8 +6,9 @@
 
 use super::NominalLens;
 use crate::lens::{
-    ErrorDistribution, Lens, Perturbation, PerturbationKind, Quantity, Shape, TEST_WAVELENGTH,
-    Tolerance, ToleranceGrade, ToleranceSheet, conic_of_sag, curvature_of_fringes, fourth_of_sag,
+    ErrorDistribution, Lens, Perturbation, PerturbationKind, Quantity, Shape, System,
+    TEST_WAVELENGTH, Tolerance, ToleranceGrade, ToleranceSheet, conic_of_sag, curvature_of_fringes,
+    fourth_of_sag,
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -207,6 +208,13 @@ pub fn bounded_tolerances(
     (bounded, held)
 }
 
+/// True for a surface of which one side is a GRIN medium: errors that break the symmetry about its axis are not
+/// computed.
+pub fn is_beside_grin(system: &System<f64>, surface: usize) -> bool {
+    let gap = |i: usize| system.surfaces.get(i).is_some_and(|own| own.grin.is_some());
+    gap(surface) || surface > 0 && gap(surface - 1)
+}
+
 /// Tolerances that are being collected.
 struct GradedSheet<'a> {
     nominal: &'a NominalLens,
@@ -228,7 +236,7 @@ impl GradedSheet<'_> {
         let system = &self.nominal.systems[self.nominal.primary];
         let (numbers, own) = (self.numbers, &system.surfaces[i]);
         let before = system.index_before(i);
-        let touches_grin = own.grin.is_some() || i > 0 && system.surfaces[i - 1].grin.is_some();
+        let touches_grin = is_beside_grin(system, i);
         let refracts = own.mirror || own.index != before;
         let radius = self.nominal.semi_diameters[i];
         let (alone, glass) = ((i, i), own.index != 1.0 && !own.mirror);

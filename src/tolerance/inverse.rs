@@ -25,31 +25,34 @@ pub fn loosest_tolerances(
         let (found, nominal) = (target.max(0.0).sqrt(), nominal.sqrt());
         return Err(ToleranceError::BelowNominal { found, nominal });
     }
-    let (factors, total) = equal_costs(form, sheet)?;
     if form.has_stops() {
-        let shaped = widened(&sheet.errors, |i| factors[i]);
-        let shaped = ToleranceSheet { errors: shaped, ..sheet.clone() };
-        let lenses = RandomLenses::new(form, &shaped)?;
-        let factor = widest(|factor| lenses.mean_square(factor) <= target);
-        return Ok(widened(&shaped.errors, |_| factor));
+        return widest_with_equal_costs(form, sheet, |lenses, factor| {
+            lenses.mean_square(factor) <= target
+        });
     }
+    let shaped = with_equal_costs(form, sheet, sheet)?;
+    let total: f64 = form.growth(&shaped)?.iter().sum();
     if total < 0.0 {
         let text = "by the quadratic model the expected spot falls as the tolerances widen, so that none are the \
                     loosest; expected pupils that are held or other tolerances";
         return Err(ToleranceError::Other(text.to_owned()));
     }
-    let scale = if total > 0.0 { ((target - form.nominal) / total).sqrt() } else { 1.0 };
-    Ok(widened(&sheet.errors, |i| factors[i] * scale))
+    let scale = if total > 0.0 { ((target - nominal) / total).sqrt() } else { 1.0 };
+    Ok(widened(&shaped.errors, |_| scale))
 }
 
-/// The factors by which tolerances are widened so that each costs about the same, and what all cost
-/// then, in mm².
-fn equal_costs(
+/// Tolerances that are widened so that each costs about the same, with compensators at their stops as often as with
+/// the errors of `known`.
+fn with_equal_costs(
     form: &QuadraticForm,
     sheet: &ToleranceSheet,
-) -> Result<(Vec<f64>, f64), ToleranceError> {
+    known: &ToleranceSheet,
+) -> Result<ToleranceSheet, ToleranceError> {
+    let stops = form.stop_curvature(known)?;
     // What an error costs alone; what correlated ones cost together is in the sum.
-    let cost = |(i, t): (usize, &Tolerance)| 0.5 * form.second.of(i, i) * t.deviation().powi(2);
+    let cost = |(i, t): (usize, &Tolerance)| {
+        0.5 * form.second_with_stops((i, i), stops.as_ref()) * t.deviation().powi(2)
+    };
     let costs: Vec<f64> = sheet.errors.iter().enumerate().map(cost).collect();
     let paid = costs.iter().filter(|cost| **cost > 0.0).count().max(1);
     let mean = costs.iter().filter(|cost| **cost > 0.0).sum::<f64>() / paid as f64;
@@ -58,9 +61,27 @@ fn equal_costs(
         if *cost == 0.0 { MOST } else { (mean / cost.abs()).sqrt().clamp(1.0 / MOST, MOST) }
     };
     let factors: Vec<f64> = costs.iter().map(factor).collect();
-    let wider = ToleranceSheet { errors: widened(&sheet.errors, |i| factors[i]), ..sheet.clone() };
-    let total = form.growth(&wider)?.iter().sum();
-    Ok((factors, total))
+    Ok(ToleranceSheet { errors: widened(&sheet.errors, |i| factors[i]), ..sheet.clone() })
+}
+
+/// The number of times that the costs of errors are found for the tolerances that they lead to, where compensators
+/// have stops.
+const ROUNDS: usize = 4;
+
+/// The loosest tolerances with which a condition permits random lenses, by a form and the factor of their errors.
+fn widest_with_equal_costs(
+    form: &QuadraticForm,
+    sheet: &ToleranceSheet,
+    is_permitted: impl Fn(&RandomLenses, f64) -> bool,
+) -> Result<Vec<Tolerance>, ToleranceError> {
+    let mut found = sheet.clone();
+    for _ in 0..if form.has_stops() { ROUNDS } else { 1 } {
+        let shaped = with_equal_costs(form, sheet, &found)?;
+        let lenses = RandomLenses::new(form, &shaped)?;
+        let factor = widest(|factor| is_permitted(&lenses, factor));
+        found.errors = widened(&shaped.errors, |_| factor);
+    }
+    Ok(found.errors)
 }
 
 fn widened(tolerances: &[Tolerance], factor: impl Fn(usize) -> f64) -> Vec<Tolerance> {
@@ -154,10 +175,5 @@ pub fn loosest_for_yield(
         let (found, nominal) = (limit, form.as_designed().sqrt());
         return Err(ToleranceError::BelowNominal { found, nominal });
     }
-    let (factors, _) = equal_costs(form, sheet)?;
-    let shaped = widened(&sheet.errors, |i| factors[i]);
-    let shaped = ToleranceSheet { errors: shaped, ..sheet.clone() };
-    let lenses = RandomLenses::new(form, &shaped)?;
-    let factor = widest(|factor| lenses.good(limit, factor) >= share);
-    Ok(widened(&shaped.errors, |_| factor))
+    widest_with_equal_costs(form, sheet, |lenses, factor| lenses.good(limit, factor) >= share)
 }

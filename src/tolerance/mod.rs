@@ -84,7 +84,7 @@ pub use covariance::{
 pub use effects::{RayEffects, SecondDerivatives};
 pub use error::{StopTest, ToleranceError, refuse_lost_lenses};
 pub use form::{AdjustedForm, ErrorProducts, FocusTreatment, QuadraticForm};
-pub use grade::{PriceClass, bounded_tolerances, graded_sheet, price_classes};
+pub use grade::{PriceClass, bounded_tolerances, graded_sheet, is_beside_grin, price_classes};
 pub use groups::{KindShare, LensPart, PartShare, shares_by_kind, shares_by_part};
 pub use histogram::{SpotHistogram, yield_band};
 pub use inverse::{form_yield, loosest_for_yield, loosest_tolerances};

@@ -161,8 +161,12 @@ impl<'a> Sampler<'a> {
                 colours.push(rays);
             }
         }
-        let dark =
-            || ToleranceError::Other(format!("no light of field {} gets through", number + 1));
+        let dark = || {
+            ToleranceError::Other(format!(
+                "no light of field {} gets through; expected a smaller field, or one of weight 0",
+                number + 1
+            ))
+        };
         let chief = chief.filter(|_| shares > 0.0).ok_or_else(dark)?;
         for colour in &mut colours {
             colour.weights.iter_mut().for_each(|w| *w /= shares);

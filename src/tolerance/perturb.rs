@@ -3,7 +3,7 @@
 //! Errors of one surface apply first, then those of bodies: rolls, then bodies of few surfaces, then
 //! larger ones that contain them, each of which carries along what it contains.
 
-use super::ToleranceError;
+use super::{ToleranceError, is_beside_grin};
 use crate::lens::{
     Perturbation, PerturbationKind, Pose, RigidMotion, Surface, SurfaceAperture, System,
 };
@@ -74,7 +74,7 @@ fn check(lens: &NominalLens, what: Perturbation) -> Result<(), ToleranceError> {
     }
     let refuse = |why: &'static str| Err(ToleranceError::NotPossible { what, why });
     let own = &system.surfaces[first];
-    let touches_grin = own.grin.is_some() || first > 0 && system.surfaces[first - 1].grin.is_some();
+    let touches_grin = is_beside_grin(system, first);
     match kind {
         PerturbationKind::ThicknessAdjusted if first + 1 >= surfaces => {
             refuse("has no gap behind the next surface that could take it up")

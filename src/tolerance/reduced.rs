@@ -167,6 +167,16 @@ const LINEAR: usize = 0;
 /// The number of lenses whose errors are combined at once.
 const LENSES: u64 = 256;
 
+/// The number of lenses that tell how often compensators are at their stops, and their seed.
+const AT_STOPS: u64 = 4_000;
+const SEED: u64 = 0x57_0950;
+/// The shares of the variances of errors, and their weights in a mean over all of them (Gauss and Legendre).
+const VARIANCES: [[f64; 2]; 3] = [
+    [0.112_701_665_379_258_3, 5.0 / 18.0],
+    [0.5, 8.0 / 18.0],
+    [0.887_298_334_620_741_7, 5.0 / 18.0],
+];
+
 /// A quadratic form in few combinations of its variables.
 pub(super) struct ReducedForm {
     nominal: f64,
@@ -250,6 +260,29 @@ impl ReducedForm {
         let sum = self.nominal + factor * (linear + factor * square);
         let cost = |own: &AdjustedForm| own.cost(&own.best_of(adjustments, factor));
         sum.max(0.0) + self.adjusted.as_ref().map_or(0.0, cost)
+    }
+
+    /// The second derivatives by the best adjustments of what the ends of their travel cost, as the mean over random
+    /// lenses and over the variances of their errors from none to those of the tolerances; `None` at the fixed image
+    /// plane.
+    ///
+    /// # Errors
+    /// None but those of lenses that are stopped.
+    pub(super) fn stop_curvature(
+        &self,
+        tolerances: &[Tolerance],
+    ) -> Result<Option<DMatrix<f64>>, ToleranceError> {
+        let Some(adjusted) = &self.adjusted else { return Ok(None) };
+        let lenses = self.random_lenses(tolerances, SEED, AT_STOPS, &|| false)?;
+        let count = adjusted.nominal.len();
+        let of_lens = |errors: &ErrorMultiples| {
+            VARIANCES.iter().fold(DMatrix::zeros(count, count), |sum, [variance, weight]| {
+                let best = adjusted.best_of(&errors.adjustments, variance.sqrt());
+                sum + *weight * adjusted.travel.derivatives_of_least(&best).1
+            })
+        };
+        let sum = lenses.iter().fold(DMatrix::zeros(count, count), |sum, own| sum + of_lens(own));
+        Ok(Some(sum / lenses.len() as f64))
     }
 
     /// The adjustments of a lens with some errors within their travel, focus first; none at the fixed

@@ -29,6 +29,21 @@ pub struct Derivatives {
     pub second: f64,
 }
 
+impl Derivatives {
+    /// The same, 0 where an error of this standard deviation changes the value by rounding alone.
+    pub fn without_rounding(self, deviation: f64) -> Self {
+        let above = |by: f64, deviation: f64| {
+            if (by * deviation).abs() <= ROUNDING * self.value.abs() { 0.0 } else { by }
+        };
+        let (first, second) =
+            (above(self.first, deviation), above(self.second, deviation * deviation));
+        Self { first, second, ..self }
+    }
+}
+
+/// A change below this share of a merit is rounding.
+const ROUNDING: f64 = 1e-14;
+
 impl From<Jet2> for Derivatives {
     fn from(jet: Jet2) -> Self {
         let first = jet.slope[0];

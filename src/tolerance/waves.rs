@@ -47,7 +47,9 @@ impl WavefrontModel {
     ) -> Result<Self, ToleranceError> {
         let beam = WaveBeam::new((lens, zoom), scene)?;
         let arrived = beam.trace(&scene.lens.systems)?;
-        let focus = best_plane(&beam, &arrived);
+        let adjustments = adjustments(sheet);
+        let travel = adjustments[0].travel;
+        let focus = best_plane(&beam, &arrived).clamp(-travel, travel);
         let numbers = WaveNumbers::new(scene, sheet)?;
         let effects = wave_effects((scene, &beam), &numbers, (&arrived, focus), stop)?;
         let [mut near, mut best] = effects;
@@ -56,7 +58,6 @@ impl WavefrontModel {
             near.exact = Some(second_derivatives((scene, &beam), &errors, 0.0, stop)?);
             best.exact = Some(second_derivatives((scene, &beam), &errors, focus, stop)?);
         }
-        let adjustments = adjustments(sheet);
         Ok(Self { forms: [near.fixed(), best.adjusted(&adjustments)], adjustments, beam })
     }
 
@@ -74,11 +75,7 @@ impl WavefrontModel {
     /// The derivatives of the variance by an error at the fixed image plane and adjusted, in squared waves
     /// per unit and squared unit of the error.
     pub fn derivatives(&self, error: usize) -> [Derivatives; 2] {
-        self.forms.each_ref().map(|form| Derivatives {
-            value: form.nominal,
-            first: form.first[error],
-            second: form.second.of(error, error),
-        })
+        self.forms.each_ref().map(|form| form.derivatives(error))
     }
 
     /// The variance of lenses with random errors by their rays, in squared waves. Each is adjusted as the form

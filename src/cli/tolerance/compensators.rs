@@ -58,7 +58,7 @@ pub(super) fn compensator_table(rows: &[CompensatorRow]) -> TextTable {
     for row in rows {
         let (factor, unit) =
             if row.part.is_angle() { (60.0_f64.to_degrees(), "'") } else { (1.0, " mm") };
-        let number = |value: f64| format!("{}{unit}", ShortNumber(factor * value));
+        let number = |value: f64| format!("{}{unit}", ShortNumber(factor * value + 0.0));
         let found = row.real.unwrap_or(row.form);
         let place = row.part.in_lens().map_or_else(String::new, |p| surfaces(p.first, p.last));
         table.row([

@@ -1,9 +1,10 @@
 //! The loosest tolerances in the results of `tolerance`.
 
-use super::tables::{half_range, percent, surfaces};
+use super::tables::{percent, surfaces};
+use super::units::half_range_text;
 use crate::cli::output::{ShortNumber, TextTable};
 use crate::lens::Tolerance;
-use crate::tolerance::{LoosestTolerances, PriceClass};
+use crate::tolerance::{LoosestTolerances, NominalLens, PriceClass};
 use serde::Serialize;
 use std::fmt::{self, Display};
 
@@ -14,6 +15,9 @@ pub(super) struct LoosestReport {
     prices: Option<LoosestPrices>,
     #[serde(skip)]
     found: Option<LoosestTolerances>,
+    /// The half ranges as text.
+    #[serde(skip)]
+    stated: Vec<String>,
 }
 
 /// The prices of the loosest tolerances, and the yield with them.
@@ -30,15 +34,17 @@ struct LoosestPrices {
 }
 
 impl LoosestReport {
-    pub(super) fn new(found: Option<LoosestTolerances>) -> Self {
+    pub(super) fn new(found: Option<LoosestTolerances>, lens: &NominalLens) -> Self {
         let prices = |found: &LoosestTolerances| LoosestPrices {
             classes: found.prices.iter().map(|price| price.map(|(class, _)| class)).collect(),
             good: found.good,
             confirmed: found.confirmed,
         };
+        let text = |own: &Tolerance| half_range_text(own, lens);
         Self {
             loosest: found.as_ref().map(|found| found.sheet.errors.clone()),
             prices: found.as_ref().map(prices),
+            stated: found.iter().flat_map(|found| &found.sheet.errors).map(text).collect(),
             found,
         }
     }
@@ -65,12 +71,29 @@ impl LoosestReport {
     }
 }
 
+impl LoosestReport {
+    fn table(&self, tolerances: &[Tolerance], classes: &[Option<PriceClass>]) -> TextTable {
+        let mut table = TextTable::new(&["loosest tolerances", "surfaces", "half range", "class"]);
+        for ((Tolerance { error, .. }, class), stated) in
+            tolerances.iter().zip(classes).zip(&self.stated)
+        {
+            table.row([
+                error.kind.name().to_owned(),
+                surfaces(error.first, error.last),
+                stated.clone(),
+                class.map_or("", PriceClass::name).to_owned(),
+            ]);
+        }
+        table
+    }
+}
+
 impl Display for LoosestReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Some((found, prices)) = self.found.as_ref().zip(self.prices.as_ref()) else {
             return Ok(());
         };
-        writeln!(f, "\n{}", loosest_table(&found.sheet.errors, &prices.classes))?;
+        writeln!(f, "\n{}", self.table(&found.sheet.errors, &prices.classes))?;
         if let Some([good, by_class]) = found.good {
             let [good, by_class] = [good, by_class].map(percent);
             writeln!(f, "yield by the quadratic model: {good}; each at its class: {by_class}")?;
@@ -85,17 +108,4 @@ impl Display for LoosestReport {
         }
         Ok(())
     }
-}
-
-fn loosest_table(tolerances: &[Tolerance], classes: &[Option<PriceClass>]) -> TextTable {
-    let mut table = TextTable::new(&["loosest tolerances", "surfaces", "half range", "class"]);
-    for (Tolerance { error, half_range: range, .. }, class) in tolerances.iter().zip(classes) {
-        table.row([
-            error.kind.name().to_owned(),
-            surfaces(error.first, error.last),
-            half_range(error.kind, *range),
-            class.map_or("", PriceClass::name).to_owned(),
-        ]);
-    }
-    table
 }

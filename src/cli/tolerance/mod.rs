@@ -5,9 +5,10 @@ mod compensators;
 mod loosest;
 mod merits;
 mod plots;
-mod power;
 mod report;
 mod tables;
+mod units;
+mod warnings;
 
 use self::checkpoint::RandomLensSource;
 use self::loosest::LoosestReport;
@@ -16,7 +17,7 @@ use self::report::{ToleranceReport, WorstLens};
 use crate::cli::error::CliError;
 use crate::cli::failures::Failures;
 use crate::cli::input::{LensFile, LoadedLens, Tolerance as RelativeError};
-use crate::cli::output::Output;
+use crate::cli::output::{Output, ShortNumber};
 use crate::cli::output_paths::OutputPaths;
 use crate::cli::progress::{note_if_stopped, stop_flag};
 use crate::files::{self, FileLock};
@@ -107,7 +108,7 @@ pub(super) struct ToleranceArgs {
     #[arg(long, value_name = "FREQUENCY")]
     mtf: Option<f64>,
 
-    /// A file in which the lenses of Monte Carlo are saved: a run that was stopped, or one with more
+    /// A file (.json) in which the lenses of Monte Carlo are saved: a run that was stopped, or one with more
     /// --samples, goes on from there
     #[arg(long, value_name = "FILE")]
     checkpoint: Option<PathBuf>,
@@ -140,12 +141,13 @@ impl ToleranceArgs {
         let scene = scene.map_err(refuse)?;
         let scene = if self.hold_pupils { scene.with_held_pupils() } else { scene };
         let sheet = self.sheet(&opened, &scene)?;
+        self.check_frequency(&opened)?;
         let mut failures = Failures::default();
         let analysis = self.analysis((&opened, &scene, &sheet), &stops, &mut failures)?;
         refuse_lost_lenses(analysis.lost, analysis.samples, "these tolerances").map_err(refuse)?;
         let loosest = self.loosest((&opened.lens, &scene), &analysis, (&sheet, &stops));
-        let loosest =
-            LoosestReport::new(loosest.map_err(|source| self.loosest_error(&opened, &source))?);
+        let loosest = loosest.map_err(|source| self.loosest_error(&opened, &source))?;
+        let loosest = LoosestReport::new(loosest, &scene.lens);
         let further = FurtherMerits::new(self, (&opened.lens, &scene, &sheet), &stops);
         let further = further.map_err(refuse)?;
         note_if_stopped(&stop);
@@ -264,15 +266,36 @@ impl ToleranceArgs {
         Ok(())
     }
 
+    /// Refuses a frequency at which no lens of this aperture has any contrast.
+    fn check_frequency(&self, opened: &LoadedLens) -> Result<(), CliError> {
+        let Some(frequency) = self.mtf else { return Ok(()) };
+        let first_order = opened.ray_model(self.zoom)?.first_order;
+        let shortest = opened.lens.wavelengths.iter().map(|w| w.um).fold(f64::INFINITY, f64::min);
+        let cutoff = first_order.working_f_number.map(|f| 1e3 / (shortest * f.abs()));
+        match cutoff.filter(|cutoff| frequency > *cutoff) {
+            Some(cutoff) => Err(CliError::Input(format!(
+                "--mtf: found {frequency}; expected at most {} cycles/mm, where diffraction ends all contrast",
+                ShortNumber(cutoff)
+            ))),
+            None => Ok(()),
+        }
+    }
+
+    /// The class of the tolerances; `None` for those of the lens file.
+    fn grade_of(&self, lens: &Lens) -> Option<ToleranceGrade> {
+        let own = lens.tolerances.is_some();
+        self.grade.or_else(|| (!own).then(ToleranceGrade::default))
+    }
+
     /// The tolerances of the lens file, or those of the class, with the compensators that are asked for.
     fn sheet(
         &self,
         opened: &LoadedLens,
         scene: &ToleranceScene,
     ) -> Result<ToleranceSheet, CliError> {
-        let mut sheet = match (&opened.lens.tolerances, self.grade) {
-            (Some(sheet), None) => sheet.clone(),
-            (_, grade) => graded_sheet(&opened.lens, &scene.lens, grade.unwrap_or_default()),
+        let mut sheet = match (&opened.lens.tolerances, self.grade_of(&opened.lens)) {
+            (_, Some(grade)) => graded_sheet(&opened.lens, &scene.lens, grade),
+            (own, None) => own.clone().unwrap_or_default(),
         };
         let check = |sheet: &ToleranceSheet, blamed: &str| {
             let with = Lens { tolerances: Some(sheet.clone()), ..opened.lens.clone() };

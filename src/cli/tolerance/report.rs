@@ -1,11 +1,12 @@
 //! The results of `tolerance` as JSON and as text.
 
 use super::ToleranceArgs;
-use super::compensators::{CompensatorRow, compensator_rows, compensator_table, stop_warning};
+use super::compensators::{CompensatorRow, compensator_rows, compensator_table};
 use super::loosest::LoosestReport;
 use super::merits::{FurtherMerits, FurtherRow, GroupedShares};
-use super::power::PowerUnits;
-use crate::cli::output::ShortNumber;
+use super::units::{PowerUnits, half_range_text};
+use super::warnings::{grade_warning, sheet_warnings, warnings};
+use crate::cli::output::{ShortNumber, counted};
 use crate::lens::{Lens, PerturbationKind, ToleranceSheet};
 use crate::tolerance::{
     AsBuiltSpot, Derivatives, FocusTreatment, MadeLens, NominalLens, PupilMotion, StoppedLenses,
@@ -69,6 +70,9 @@ pub(super) struct SensitivityRow {
     pub(super) first: usize,
     pub(super) last: usize,
     pub(super) half_range: f64,
+    /// The half range as text.
+    #[serde(skip)]
+    pub(super) stated: String,
     /// A half range of power in other units.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) power: Option<PowerUnits>,
@@ -97,6 +101,8 @@ impl ToleranceReport {
         (loosest, mut further): (LoosestReport, FurtherMerits),
     ) -> Result<Self, ToleranceError> {
         let mut warnings = warnings(&analysis);
+        warnings.extend(sheet_warnings(sheet, &scene.lens));
+        warnings.extend(grade_warning(arguments.grade_of(lens), &scene.lens));
         warnings.extend(loosest.warnings());
         warnings.extend(further.warnings(sheet));
         let shares = analysis.growth_shares(sheet)?;
@@ -148,17 +154,15 @@ fn rows(
 ) -> Vec<SensitivityRow> {
     let both = sheet.errors.iter().zip(shares.iter().copied()).enumerate();
     both.map(|(i, (tolerance, [fixed, refocused]))| {
-        let [by_fixed, by_adjusted] = analysis.forms.each_ref().map(|form| Derivatives {
-            value: form.nominal,
-            first: form.first[i],
-            second: form.second.of(i, i),
-        });
         let sigma = tolerance.deviation();
+        let [by_fixed, by_adjusted] =
+            analysis.forms.each_ref().map(|form| form.derivatives(i).without_rounding(sigma));
         SensitivityRow {
             kind: tolerance.error.kind,
             first: tolerance.error.first,
             last: tolerance.error.last,
             half_range: tolerance.half_range,
+            stated: half_range_text(tolerance, lens),
             power: PowerUnits::new(tolerance, lens),
             sigma,
             fixed: ShareOfGrowth { by: by_fixed, share: fixed },
@@ -169,56 +173,15 @@ fn rows(
     .collect()
 }
 
-fn warnings(analysis: &ToleranceAnalysis) -> Vec<String> {
-    let mut warnings = Vec::new();
-    for spot in analysis.spots.iter().filter(|spot| !spot.form_agrees) {
-        let [apart, error] = spot.difference.map(|v| 100.0 * v / spot.form_mean_rms);
-        warnings.push(format!(
-            "{}: the quadratic model differs from Monte Carlo by {apart:.2} % ± {error:.2} %; the \
-             corrected numbers count",
-            focus_name(spot)
-        ));
-    }
-    warnings.extend(stop_warning(analysis.stopped));
-    for spot in analysis.spots.iter().filter(|spot| !spot.rims_agree) {
-        let [change, error] =
-            spot.clipping.unwrap_or_default().map(|v| 100.0 * v / spot.form_mean_rms);
-        warnings.push(format!(
-            "{}: rims that clip change the mean rms by {change:.2} % ± {error:.2} %; the errors of the \
-             means count that, the quantiles and the yield leave it out",
-            focus_name(spot)
-        ));
-    }
-    if analysis.dark > 0 {
-        warnings.push(format!(
-            "in {} of {} lenses with rims a field gets no light; what rims change leaves these out",
-            analysis.dark, analysis.with_rims
-        ));
-    }
-    if analysis.lost > 0 {
-        warnings.push(format!(
-            "{} of {} lenses lose rays and count as bad; the means leave them out",
-            analysis.lost, analysis.samples
-        ));
-    }
-    warnings
-}
-
-fn focus_name(spot: &AsBuiltSpot) -> String {
-    let name = serde_json::to_value(spot.focus).unwrap_or_default();
-    name.as_str().unwrap_or_default().to_owned()
-}
-
 impl Display for ToleranceReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "{} manufacturing errors, {}{} rays, {} lenses by Monte Carlo; spots as rms in mm\n",
-            self.errors,
+            "{}, {}{} rays, {} lenses by Monte Carlo; spots as rms in mm\n",
+            counted(self.errors, "manufacturing error"),
             match self.correlations {
                 0 => String::new(),
-                1 => "1 correlation, ".to_owned(),
-                count => format!("{count} correlations, "),
+                count => format!("{}, ", counted(count, "correlation")),
             },
             self.rays,
             self.samples

@@ -2,7 +2,7 @@
 
 use super::report::{SensitivityRow, ToleranceReport};
 use crate::cli::output::{ShortNumber, TextTable};
-use crate::lens::{PerturbationKind, SurfaceNumber};
+use crate::lens::SurfaceNumber;
 use crate::tolerance::AsBuiltSpot;
 
 /// The number of sensitivities in the text.
@@ -45,10 +45,7 @@ impl ToleranceReport {
             let own = [
                 row.kind.name().to_owned(),
                 surfaces(row.first, row.last),
-                row.power.map_or_else(
-                    || half_range(row.kind, row.half_range),
-                    |power| power.to_string(),
-                ),
+                row.stated.clone(),
                 percent(row.fixed.share),
                 percent(row.refocused.share),
             ];
@@ -87,16 +84,4 @@ pub(super) fn surfaces(first: usize, last: usize) -> String {
     } else {
         format!("{}-{}", number(first), number(last))
     }
-}
-
-/// A half range with its unit; angles in minutes of arc.
-pub(super) fn half_range(kind: PerturbationKind, value: f64) -> String {
-    let unit = match kind {
-        _ if kind.is_angle() => return format!("{}'", ShortNumber(60.0 * value.to_degrees())),
-        PerturbationKind::Abbe => return format!("{} %", ShortNumber(100.0 * value)),
-        PerturbationKind::Curvature => " /mm",
-        PerturbationKind::Conic | PerturbationKind::Asphere | PerturbationKind::Index => "",
-        _ => " mm",
-    };
-    format!("{}{unit}", ShortNumber(value))
 }

@@ -285,7 +285,7 @@ fn compensators_are_read_shown_and_refused() {
     assert!(json["stopped"]["share"].as_f64().unwrap() > 0.0);
     for (option, words) in [
         ("index@1=0.1", "expected KIND=TRAVEL"),
-        ("sensor_tilt_x@1=0.1", "neither"),
+        ("sensor_tilt_x@1=0.1", "expected sensor_tilt_x=TRAVEL"),
         (
             "thickness@9=0.1",
             "error: --compensator: the compensator `thickness` names surfaces 9 to 9",

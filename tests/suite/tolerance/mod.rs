@@ -5,6 +5,7 @@ mod as_built_term;
 mod compensators;
 mod correlations;
 mod derivatives;
+mod focus_travel;
 mod further;
 mod hard_cases;
 mod many_errors;

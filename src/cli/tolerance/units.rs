@@ -1,7 +1,7 @@
-//! A tolerance of power in the units of shops.
+//! Half ranges in the units of shops.
 
 use crate::cli::output::ShortNumber;
-use crate::lens::{PerturbationKind, Tolerance, fringes_of_curvature};
+use crate::lens::{PerturbationKind, Tolerance, fringes_of_curvature, sag_of_conic, sag_of_fourth};
 use crate::tolerance::NominalLens;
 use serde::Serialize;
 use std::fmt;
@@ -40,6 +40,40 @@ impl fmt::Display for PowerUnits {
         let Some((percent, radius)) = self.percent.zip(self.radius_mm) else { return Ok(()) };
         write!(f, ", {} %, {} mm", ShortNumber(percent), ShortNumber(radius))
     }
+}
+
+/// A half range with its unit: power in fringes and of the radius, conic constants and coefficients of r⁴ with the
+/// change of the sag at the semi-diameter, angles in minutes of arc.
+pub(super) fn half_range_text(tolerance: &Tolerance, lens: &NominalLens) -> String {
+    if let Some(power) = PowerUnits::new(tolerance, lens) {
+        return power.to_string();
+    }
+    let (kind, value) = (tolerance.error.kind, tolerance.half_range);
+    let unit = match kind {
+        _ if kind.is_angle() => return format!("{}'", ShortNumber(60.0 * value.to_degrees())),
+        PerturbationKind::Abbe => return format!("{} %", ShortNumber(100.0 * value)),
+        PerturbationKind::Conic | PerturbationKind::Asphere => {
+            return format!("{}{}", ShortNumber(value), sag_text(tolerance, lens));
+        }
+        PerturbationKind::Index => "",
+        PerturbationKind::Curvature => " /mm",
+        _ => " mm",
+    };
+    format!("{}{unit}", ShortNumber(value))
+}
+
+/// The change of the sag at the semi-diameter by an error of a conic constant or of a coefficient of r⁴.
+fn sag_text(tolerance: &Tolerance, lens: &NominalLens) -> String {
+    let (surface, value) = (tolerance.error.first, tolerance.half_range);
+    let system = &lens.systems[lens.primary];
+    let own = system.surfaces.get(surface).zip(lens.semi_diameters.get(surface));
+    let Some((own, rim)) = own.filter(|(_, rim)| **rim > 0.0) else { return String::new() };
+    let sag = if tolerance.error.kind == PerturbationKind::Conic {
+        sag_of_conic(value, own.shape.curvature(), *rim)
+    } else {
+        sag_of_fourth(value, *rim)
+    };
+    format!(" (sag {} um)", ShortNumber(1e3 * sag))
 }
 
 #[cfg(test)]
