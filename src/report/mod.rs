@@ -18,6 +18,7 @@ mod prescription_tables;
 mod sheet;
 mod step;
 mod surface_tolerances;
+mod tolerance_warnings;
 
 pub use analysis_figure::{
     AnalysisFigure, CurveColors, FigureFormat, FigureKind, note_number, sheet_bytes,
@@ -36,3 +37,4 @@ pub use pareto::ParetoReport;
 pub use prescription::{ReportSettings, prescription_report};
 pub use sheet::scale_text;
 pub use surface_tolerances::surface_tolerances;
+pub use tolerance_warnings::tolerance_warnings;

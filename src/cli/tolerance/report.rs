@@ -5,9 +5,10 @@ use super::compensators::{CompensatorRow, compensator_rows, compensator_table};
 use super::loosest::LoosestReport;
 use super::merits::{FurtherMerits, FurtherRow, GroupedShares};
 use super::units::{PowerUnits, half_range_text};
-use super::warnings::{grade_warning, sheet_warnings, warnings};
+use super::warnings::warnings;
 use crate::cli::output::{ShortNumber, counted};
 use crate::lens::{Lens, PerturbationKind, ToleranceSheet};
+use crate::report::tolerance_warnings;
 use crate::tolerance::{
     AsBuiltSpot, Derivatives, FocusTreatment, MadeLens, NominalLens, PupilMotion, StoppedLenses,
     ToleranceAnalysis, ToleranceError, ToleranceScene,
@@ -101,8 +102,8 @@ impl ToleranceReport {
         (loosest, mut further): (LoosestReport, FurtherMerits),
     ) -> Result<Self, ToleranceError> {
         let mut warnings = warnings(&analysis);
-        warnings.extend(sheet_warnings(sheet, &scene.lens));
-        warnings.extend(grade_warning(arguments.grade_of(lens), &scene.lens));
+        let of_a_class = arguments.grade_of(lens).is_some();
+        warnings.extend(tolerance_warnings((sheet, of_a_class), &scene.lens, &analysis));
         warnings.extend(loosest.warnings());
         warnings.extend(further.warnings(sheet));
         let shares = analysis.growth_shares(sheet)?;

@@ -3,6 +3,7 @@
 use egui::{Grid, RichText, Ui};
 
 use crate::lens::Lens;
+use crate::report::tolerance_warnings;
 use crate::session::{AsBuiltLens, Command};
 use crate::studio::actions::Actions;
 use crate::studio::number;
@@ -30,6 +31,10 @@ pub(super) fn facts(ui: &mut Ui, made: &AsBuiltLens, ms: f64) {
     let lost = made.analysis.lost;
     if lost > 0 {
         let text = format!("{lost} of {samples} real lenses lose rays and count as bad");
+        ui.label(RichText::new(text).small().color(ui.visuals().warn_fg_color));
+    }
+    let of_a_class = !made.from_lens;
+    for text in tolerance_warnings((&made.sheet, of_a_class), &made.nominal, &made.analysis) {
         ui.label(RichText::new(text).small().color(ui.visuals().warn_fg_color));
     }
     let apart = made.analysis.spots.iter().any(|spot| samples > 0 && !spot.form_agrees);
