@@ -33,7 +33,7 @@ pub struct Illumination {
     /// The area of the cone of the field's rays in direction cosines: π sin² of the half angle for a
     /// full cone; 0 if no light gets through.
     pub cone: Estimate,
-    /// The same relative to the first field; `None` if that one is dark.
+    /// The same relative to the first field; `None` if that one is dark or has no cone.
     pub relative_cone: Option<Estimate>,
     /// The reason if there is no light, or no number of it.
     pub error: Option<AnalysisError>,
@@ -67,12 +67,20 @@ pub fn illumination(model: &RayModel, wavelength: usize, accuracy: Accuracy) -> 
             relative: of_first.filter(|_| is_known).map(|first| ratio(irradiance_or_none, first)),
             point,
             cone,
-            relative_cone: first.map(|first| ratio(cone, first.cone)),
+            relative_cone: first.filter(has_cone).map(|first| ratio(cone, first.cone)),
             error: irradiance.err(),
         }
     };
     model.fields.iter().zip(&lights).map(result).collect()
 }
+
+/// True for light that comes from a cone, and not from one direction alone as that of an afocal lens does.
+fn has_cone(light: &FieldLight) -> bool {
+    light.cone.value > light.cone.error.max(NO_CONE)
+}
+
+/// A cone below this area in direction cosines is rounding.
+const NO_CONE: f64 = 1e-14;
 
 /// No irradiance, or one that is not known.
 fn without_number(why: AnalysisError) -> Estimate {

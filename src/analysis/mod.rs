@@ -139,6 +139,17 @@ pub enum AnalysisError {
     /// The chief ray does not reach the image.
     #[error("no chief ray: the ray through the middle of the pupil does not reach the image")]
     NoChief,
+    /// The lens has no focal length: its light meets in no point.
+    #[error(
+        "the lens is afocal: its light meets in no point, of which diffraction could be told; expected a lens \
+         that focuses it, as a paraxial one behind it does"
+    )]
+    Afocal,
+    /// The image plane is displaced to the exit pupil, or beyond it.
+    #[error(
+        "the image plane is displaced to the exit pupil or beyond it; expected smaller displacements"
+    )]
+    BeyondPupil,
     /// Two rays of the pupil have the same direction cosines on the reference sphere.
     #[error(
         "the pupil folds: two rays have the same direction from the reference sphere, and \
@@ -176,7 +187,9 @@ impl AnalysisError {
     pub fn is_loss_of_light(&self) -> bool {
         match self {
             Self::NoLight | Self::NoRays(_) | Self::Unbounded | Self::NoChief => true,
-            Self::FoldedPupil
+            Self::Afocal
+            | Self::BeyondPupil
+            | Self::FoldedPupil
             | Self::FoldedImage
             | Self::IrregularPupil
             | Self::NotSymmetric

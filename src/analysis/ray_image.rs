@@ -2,7 +2,8 @@
 //!
 //! Both are sums over the rays of a quadrature of the pupil, by weight. What they count, the light on one
 //! side of an edge in the image, is no smooth function of the pupil, so that the sums do not converge as fast as
-//! the quadrature does; the order is raised until the changes of all shares are within the tolerance.
+//! the quadrature does; the order is raised until the changes of all shares are within the tolerance, or those of
+//! the density if no shares are asked for.
 
 use super::{AnalysisError, Estimate, SquareGrid, lit_region};
 use crate::lens::FieldPoint;
@@ -23,7 +24,7 @@ pub struct RayImage {
     pub energy: Vec<Estimate>,
     /// The radii in mm of the circles about the centre that hold the shares of the light asked for.
     pub share_radii: Vec<Estimate>,
-    /// True if the shares are within the tolerance.
+    /// True if the shares are within the tolerance; the density, if no circles are asked for.
     pub reached: bool,
     /// The number of rays.
     pub rays: usize,
@@ -84,9 +85,7 @@ pub fn ray_image(
         let center = *center.get_or_insert_with(|| light.centroid());
         let sums = LightSums::new(&light, center, request).ok_or(AnalysisError::NoLight)?;
         let errors = before.as_ref().map(|before| sums.errors(before));
-        let is_within = errors
-            .as_ref()
-            .is_some_and(|found| found.circles.iter().all(|error| *error <= accuracy.tolerance));
+        let is_within = errors.as_ref().is_some_and(|found| found.deciding() <= accuracy.tolerance);
         let is_last = order + 1 == orders || rays >= accuracy.max_rays * lit.len();
         if let Some(errors) = errors.filter(|_| is_within || is_last) {
             return Ok(sums.image((center, request), errors, (is_within, rays)));
@@ -181,6 +180,13 @@ struct SumErrors {
     circles: Vec<f64>,
     density: f64,
     share_radii: Vec<f64>,
+}
+
+impl SumErrors {
+    /// The error that the tolerance is for: that of the shares within circles, or of the density without any.
+    fn deciding(&self) -> f64 {
+        self.circles.iter().copied().reduce(f64::max).unwrap_or(self.density)
+    }
 }
 
 impl LightSums {

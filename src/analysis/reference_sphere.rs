@@ -155,6 +155,33 @@ impl ReferenceSphere {
         Ok(sphere)
     }
 
+    /// The sphere of a pupil whose light is focused.
+    ///
+    /// # Errors
+    /// As those of [`ReferenceSphere::for_region`], and an afocal lens, whose plane has no centre.
+    pub(super) fn focused(region: &Region<'_>) -> Result<Self, AnalysisError> {
+        let sphere = Self::for_region(region)?;
+        if sphere.form == ReferenceForm::Plane { Err(AnalysisError::Afocal) } else { Ok(sphere) }
+    }
+
+    /// The displacement along the light at which the phases of the sphere's cosines, which are linear in it, are
+    /// those of an image plane displaced by `shift` mm, and the factor of frequencies there: the way from the exit
+    /// pupil, along the chief ray, is another one.
+    ///
+    /// # Errors
+    /// A plane that lies at the exit pupil or beyond it.
+    pub(super) fn displaced(&self, shift: f64) -> Result<(f64, f64), AnalysisError> {
+        let factor = 1.0 + shift * self.form.curvature() / self.direction.z.abs();
+        if factor > 0.0 { Ok((shift / factor, factor)) } else { Err(AnalysisError::BeyondPupil) }
+    }
+
+    /// The place of a point about the centre at which linear phases of the sphere's cosines are those of light from
+    /// its points: across the axis and along the light, in mm.
+    pub(super) fn place_of(&self, linear: [f64; 3]) -> [f64; 3] {
+        let rest = 1.0 - linear[2] * self.form.curvature() / self.direction.z.abs();
+        if rest > 0.0 { linear.map(|part| part / rest) } else { linear }
+    }
+
     fn about(launch: &Launch<'_>, p: [f64; 2]) -> Option<Self> {
         let chief = launch.unclipped_landing(p)?;
         let path = launch.optical_path_to(launch.ray(p)?) + chief.opl.value;

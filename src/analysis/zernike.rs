@@ -8,7 +8,7 @@ use super::reference_sphere::ReferenceSphere;
 use super::{AnalysisError, Estimate, lit_region};
 use crate::lens::FieldPoint;
 use crate::math::Vec3;
-use crate::pupil::{Accuracy, Nodes, RayModel, Region, RegionKind, converge_list};
+use crate::pupil::{Accuracy, Nodes, RayModel, Region, RegionKind, converge_resolved};
 use crate::trace::{Landings, Ray, Rays};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -177,7 +177,10 @@ pub fn zernike(
         list.iter_mut().zip(&indices).for_each(|(c, index)| *c *= order.scale(*index));
         Some(list)
     };
-    let found = converge_list(&region, accuracy, numbers, |list| vec![1.0; list.len()]);
+    // With fewer nodes polynomials of the highest degree are those of lower ones, and a fit has no least.
+    let least = indices.iter().map(|index| index.degree as usize + 1).max().unwrap_or(0);
+    let scales = |list: &[f64]| vec![1.0; list.len()];
+    let found = converge_resolved(&region, accuracy, least, numbers, scales);
     let found = found.ok_or(AnalysisError::NoLight)?;
     let rounding = sphere.rounding();
     let estimate =

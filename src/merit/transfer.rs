@@ -147,6 +147,7 @@ fn refusal(why: AnalysisError) -> MeritError {
         AnalysisError::FoldedPupil => {
             "a pupil folds: two of its rays have the same direction from the reference sphere"
         }
+        AnalysisError::Afocal => "the lens is afocal",
         AnalysisError::NoChief => "a chief ray does not reach the image",
         AnalysisError::IdealPath => "the optical path through a paraxial lens is not known",
         _ => "a pupil is irregular: diffraction needs an edge that is known and star-shaped",

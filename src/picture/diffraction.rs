@@ -148,7 +148,7 @@ impl DiffractionLight {
             cut: if on { spreads.cut(longest) } else { 0.0 },
             points: contrasts.0.len(),
             reason: if aberrated { ABERRATED } else { reason([on, matters, left > tolerance]) },
-            without_aberrations: refused.filter(|_| on),
+            without_aberrations: refused,
             ..without("")
         };
         spreads.is_even = report.variation <= tolerance;

@@ -31,8 +31,8 @@ pub enum PictureError {
     NoLight,
     /// The lens is not rotationally symmetric.
     #[error(
-        "surface {0} is decentred, tilted or irregular; expected a centred lens, since the directions \
-         of light are tabulated over the distance from the axis"
+        "surface {0} is decentred, tilted, irregular or an ideal element; expected a centred lens of real \
+         surfaces, since the directions of light are tabulated over the distance from the axis"
     )]
     NotCentred(SurfaceNumber),
     /// The lens has an aperture that a turn about the axis changes.

@@ -56,14 +56,7 @@ pub fn omitted_beside(
     let mut left_out: Vec<_> = diffraction.into_iter().collect();
     left_out.push(match losses {
         // Bare surfaces on the axis.
-        None => OmittedEffect {
-            effect: "losses",
-            change: rank_ghosts(model, model.primary, Coating::Bare)
-                .ok()
-                .map(|ranking| 1.0 - ranking.direct),
-            reason: "of the light on the axis bare surfaces would take this; white loses the same, so that \
-                     a picture exposed for white does not change; --coating counts it",
-        },
+        None => omitted_losses(model),
         Some(losses) => OmittedEffect {
             effect: "polarisation",
             change: Some(losses.polarisation),
@@ -93,6 +86,19 @@ pub fn omitted_beside(
         Some(_) => {}
     }
     left_out
+}
+
+/// The losses, which are known where the lens has bare surfaces and no mirrors.
+fn omitted_losses(model: &RayModel) -> OmittedEffect {
+    // Bare surfaces on the axis.
+    let ranking = rank_ghosts(model, model.primary, Coating::Bare).ok();
+    let reason = if ranking.is_some() {
+        "of the light on the axis bare surfaces would take this; white loses the same, so that a picture exposed \
+         for white does not change; --coating counts it"
+    } else {
+        "surfaces take no light; white would lose the same, so that a picture exposed for white does not change"
+    };
+    OmittedEffect { effect: "losses", change: ranking.map(|ranking| 1.0 - ranking.direct), reason }
 }
 
 /// Diffraction of which only the axis is known.

@@ -200,9 +200,20 @@ impl SensorModel {
         signal / (self.read_noise.powi(2) + signal + dark + rounding).sqrt()
     }
 
+    /// True if so many photons and dark electrons, on the mean, fill a pixel or are its largest number: noise does
+    /// not show there.
+    pub fn is_saturated(&self, photons: f64, dark: f64) -> bool {
+        self.quantum_efficiency * photons + dark >= self.range()
+    }
+
+    /// The electrons that fill a pixel or make its largest number.
+    fn range(&self) -> f64 {
+        self.full_well.min((self.largest() - self.black_level) / self.gain)
+    }
+
     /// The time in seconds after which white fills the range of the sensor up to a margin.
     pub fn normal_exposure(&self, picture: &Picture, luminance: f64) -> f64 {
-        let range = self.full_well.min((self.largest() - self.black_level) / self.gain);
+        let range = self.range();
         let per_second = photon_count(luminance * picture.white, picture.frame.pitch, 1.0);
         NORMAL_EXPOSURE * range.max(0.0) / (self.quantum_efficiency * per_second)
     }

@@ -18,6 +18,7 @@ mod contrast_hard_cases;
 mod deliverables;
 mod design;
 mod diffraction;
+mod displaced_images;
 mod drag;
 mod effects;
 mod elements;

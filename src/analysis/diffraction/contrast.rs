@@ -45,7 +45,7 @@ fn diffraction_mtf_unless(
         return Err(AnalysisError::Interrupted);
     }
     let region = lit_region(model, field, wavelength)?;
-    let sphere = ReferenceSphere::for_region(&region)?;
+    let sphere = ReferenceSphere::focused(&region)?;
     let origin = origin(model, field, &region)?;
     let mut traces = PupilTraces::new(&region);
     let mut wave = |sphere: &ReferenceSphere, frequencies: &[f64], tolerance: f64| {
@@ -251,10 +251,10 @@ pub fn polychromatic_diffraction_mtf_unless(
 
 /// The contrast by diffraction of a field at one wavelength and frequency against displacements of the
 /// image plane along the light in mm, from the rays of one pupil; the frequency of a point is the
-/// displacement.
+/// displacement. Errors are those of [`diffraction_mtf`].
 ///
 /// # Errors
-/// As of [`diffraction_mtf`].
+/// As of [`diffraction_mtf`], and a plane at the exit pupil or beyond it.
 pub fn through_focus_mtf(
     model: &RayModel,
     field: FieldPoint,
@@ -264,14 +264,49 @@ pub fn through_focus_mtf(
     accuracy: Accuracy,
 ) -> Result<Vec<MtfPoint>, AnalysisError> {
     let region = lit_region(model, field, wavelength)?;
-    let sphere = ReferenceSphere::for_region(&region)?;
-    let function = PupilFunction::of_region(&region, &sphere, accuracy.tolerance)?;
-    let at = |defocus: &f64| {
-        let values = function.values(&[frequency], *defocus, accuracy.tolerance, &never)?;
-        let [tangential, sagittal] = values[0];
-        Ok(MtfPoint { frequency: *defocus, tangential, sagittal })
+    let sphere = ReferenceSphere::focused(&region)?;
+    let mut traces = PupilTraces::new(&region);
+    let near = DisplacedContrast::new(&mut traces, &sphere, accuracy.tolerance)?;
+    let doubled = sphere.doubled();
+    let coarse = accuracy.tolerance.max(COARSE);
+    let far = is_uncertain(&sphere, &region)
+        .then(|| DisplacedContrast::new(&mut traces, &doubled, coarse))
+        .transpose()?;
+    let at = |shift: &f64| {
+        let mut values = near.at(frequency, *shift)?;
+        if let Some(far) = &far {
+            let change = change_to(&values, &far.at(frequency, *shift)?);
+            values = [0, 1].map(|k| values[k].with_sphere(change[k]));
+        }
+        let [tangential, sagittal] = values;
+        Ok(MtfPoint { frequency: *shift, tangential, sagittal })
     };
     displacements.iter().map(at).collect()
+}
+
+/// The contrast of a pupil against the displacement of the image plane.
+struct DisplacedContrast<'a> {
+    sphere: &'a ReferenceSphere,
+    function: PupilFunction,
+    tolerance: f64,
+}
+
+impl<'a> DisplacedContrast<'a> {
+    fn new(
+        traces: &mut PupilTraces<'_>,
+        sphere: &'a ReferenceSphere,
+        tolerance: f64,
+    ) -> Result<Self, AnalysisError> {
+        let function = PupilFunction::of_traces(traces, sphere, tolerance)?;
+        Ok(Self { sphere, function, tolerance })
+    }
+
+    /// The tangential and the sagittal value at a displacement along the light in mm.
+    fn at(&self, frequency: f64, shift: f64) -> Result<[TransferValue; 2], AnalysisError> {
+        let (linear, factor) = self.sphere.displaced(shift)?;
+        let values = self.function.values(&[factor * frequency], linear, self.tolerance, &never)?;
+        Ok(values[0])
+    }
 }
 
 /// The decision whether contrast needs diffraction.

@@ -97,9 +97,15 @@ struct ColorRings {
 /// The rings and the circles without aberrations of a wavelength.
 type ColorShares = (ColorRings, Vec<Estimate>);
 
-/// A share that is not resolved is between none and all.
-fn share_estimate(found: &ConvergedList, k: usize) -> Estimate {
-    Estimate::new(found.values[k].clamp(0.0, 1.0), found.errors[k].min(1.0), found.rays)
+/// The shares within circles in ascending order. One that is not resolved is between none and all; its error is at
+/// least that of the circles next to it, as one alone may stand still by chance.
+fn share_estimates(found: &ConvergedList) -> Vec<Estimate> {
+    let estimate = |(k, value): (usize, &f64)| {
+        let near = &found.errors[k.saturating_sub(1)..(k + 2).min(found.errors.len())];
+        let error = near.iter().copied().fold(0.0, f64::max);
+        Estimate::new(value.clamp(0.0, 1.0), error.min(1.0), found.rays)
+    };
+    found.values.iter().enumerate().map(estimate).collect()
 }
 
 fn color_rings(
@@ -109,7 +115,7 @@ fn color_rings(
     interrupted: &Interruption<'_>,
 ) -> Result<ColorRings, AnalysisError> {
     let region = lit_region(model, field, wavelength)?;
-    let sphere = ReferenceSphere::for_region(&region)?;
+    let sphere = ReferenceSphere::focused(&region)?;
     let [x, y] = request.center;
     let [x, y, _] = about_sphere(&sphere, origin, [x, y, 0.0]);
     let mut last = None;
@@ -120,7 +126,7 @@ fn color_rings(
         shares
     };
     let found = PupilSamples::converge(&region, &sphere, None, accuracy, interrupted, encircled)?;
-    let shares = (0..request.radii.len()).map(|k| share_estimate(&found, k)).collect();
+    let shares = share_estimates(&found);
     Ok(ColorRings { shares, light: last.ok_or(AnalysisError::NoLight)? })
 }
 
@@ -132,14 +138,14 @@ fn perfect_rings(
     interrupted: &Interruption<'_>,
 ) -> Result<Vec<Estimate>, AnalysisError> {
     let region = lit_region(model, field, wavelength)?;
-    let sphere = ReferenceSphere::for_region(&region)?;
+    let sphere = ReferenceSphere::focused(&region)?;
     let encircled = |light: &PupilSamples| {
         let waves = vec![0.0; light.waves.len()];
         let perfect = PupilSamples { waves, ..light.clone() };
         perfect.ring_light([0.0; 2]).encircled_unless(radii, interrupted)
     };
     let found = PupilSamples::converge(&region, &sphere, None, accuracy, interrupted, encircled)?;
-    Ok((0..radii.len()).map(|k| share_estimate(&found, k)).collect())
+    Ok(share_estimates(&found))
 }
 
 /// The mean of the shares of all wavelengths by their light; errors count those that are refused.

@@ -112,7 +112,7 @@ impl ImageLight {
     ) -> Result<Option<Vec3<f64>>, AnalysisError> {
         let center = |wavelength: usize| {
             let region = lit_region(model, field, wavelength)?;
-            Ok(Some(ReferenceSphere::for_region(&region)?.center))
+            Ok(Some(ReferenceSphere::focused(&region)?.center))
         };
         match self {
             Self::Wavelength(_) => Ok(None),
@@ -159,7 +159,7 @@ pub(super) fn color_intensities(
     interrupted: &Interruption<'_>,
 ) -> Result<ColorIntensities, AnalysisError> {
     let region = lit_region(model, field, wavelength)?;
-    let sphere = ReferenceSphere::for_region(&region)?;
+    let sphere = ReferenceSphere::focused(&region)?;
     let points: Vec<[f64; 3]> =
         points.iter().map(|point| about_sphere(&sphere, origin, *point)).collect();
     let across = points.iter().map(|[x, y, _]| x.hypot(*y)).fold(0.0, f64::max);

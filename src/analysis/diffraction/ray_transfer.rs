@@ -47,7 +47,7 @@ impl TransferRays {
     /// # Errors
     /// The pupil is dark, irregular or folds.
     pub fn find(region: &Region<'_>, tolerance: f64) -> Result<Self, AnalysisError> {
-        let sphere = ReferenceSphere::for_region(region)?;
+        let sphere = ReferenceSphere::focused(region)?;
         let function = PupilFunction::of_region(region, &sphere, tolerance)?;
         let (order, degree) = function.order_and_degree();
         Ok(Self { order, degree, form: sphere.form, error: function.transfer_error() })
@@ -142,7 +142,7 @@ impl<'a> RayTransfer<'a> {
         rays: TransferRays,
         tolerance: f64,
     ) -> Result<Self, AnalysisError> {
-        let sphere = ReferenceSphere::for_region(region)?.with_form(rays.form);
+        let sphere = ReferenceSphere::focused(region)?.with_form(rays.form);
         let traced = TracedLight::new(region, &region.nodes(rays.order));
         let light = traced.on(&sphere)?;
         let sample = |i: usize| FitSample {

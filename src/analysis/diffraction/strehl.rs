@@ -92,7 +92,7 @@ impl BrightestOfColor {
         interrupted: &Interruption<'_>,
     ) -> Result<Self, AnalysisError> {
         let region = lit_region(model, field, wavelength)?;
-        let sphere = ReferenceSphere::for_region(&region)?;
+        let sphere = ReferenceSphere::focused(&region)?;
         let peaks = BlurPeaks::find(&region, &sphere, accuracy, interrupted)?;
         let (mut best_at, mut last) = ([0.0; 3], PupilSamples::default());
         let ratios = |light: &PupilSamples| {
@@ -107,13 +107,14 @@ impl BrightestOfColor {
     }
 
     fn strehl(&self) -> Strehl {
-        let Self { sphere, peaks, found, best_at: [x, y, z], .. } = self;
+        let Self { sphere, peaks, found, best_at, .. } = self;
+        let [x, y, z] = sphere.place_of(*best_at);
         let rays = found.rays + peaks.rays;
         let estimate = |k: usize| Estimate::new(found.values[k], found.errors[k], rays);
         Strehl {
             at_chief: estimate(0),
             best: estimate(1),
-            best_at: [*x, *y, z * sphere.direction.z.signum()],
+            best_at: [x, y, z * sphere.direction.z.signum()],
             is_brightest: peaks.is_whole,
             reached: found.converged,
         }
@@ -140,7 +141,8 @@ fn strehl_of_all(
     }
     let rays: usize =
         colors.parts.iter().map(|part| part.found.found.rays + part.found.peaks.rays).sum();
-    let sense = colors.parts.first().map_or(1.0, |part| part.found.sphere.direction.z.signum());
+    let sphere = colors.parts.first().map(|part| part.found.sphere.clone());
+    let sense = sphere.as_ref().map_or(1.0, |sphere| sphere.direction.z.signum());
     let mut starts = vec![[0.0; 3]];
     let mut samples = Vec::new();
     for part in colors.parts {
@@ -154,6 +156,7 @@ fn strehl_of_all(
         spread_at((model, field), (light, origin), &[[0.0; 3], best], accuracy, interrupted)?;
     let [at_chief, best_ratio] = found.intensities[..] else { return Err(AnalysisError::NoLight) };
     let counted = |ratio: Estimate| Estimate { rays: ratio.rays + rays, ..ratio };
+    let best = sphere.map_or(best, |sphere| sphere.place_of(best));
     Ok(Strehl {
         at_chief: counted(at_chief),
         best: counted(best_ratio),

@@ -50,7 +50,8 @@ impl CoatedLens {
     pub fn new(model: &RayModel, wavelength: usize, coating: Coating) -> Result<Self, GhostError> {
         let channel = &model.channels[wavelength];
         check(&channel.system)?;
-        let not_traced = |_error| GhostError::NotPlain(0.into());
+        let not_traced =
+            |_error| GhostError::NotPlain { surface: 0.into(), what: "cannot be traced" };
         let limited = limited(model).map_err(not_traced)?;
         let (system, _) = surrounded(&limited.channels[wavelength].system);
         let tracer = Tracer::new(&system).map_err(not_traced)?;

@@ -16,7 +16,7 @@ pub use path::{GhostPath, GhostRay};
 pub use real::GhostPatch;
 
 use super::coating::Coating;
-use crate::lens::{FieldPoint, SurfaceNumber, System};
+use crate::lens::{FieldPoint, Surface, SurfaceNumber, System};
 use crate::math::Vec3;
 use crate::pupil::RayModel;
 use rayon::prelude::*;
@@ -26,10 +26,14 @@ use rayon::prelude::*;
 pub enum GhostError {
     /// A surface is a mirror, decentred or tilted, or a gradient begins there.
     #[error(
-        "surface {0} is a mirror, not centred or in front of a gradient; ghosts are those of centred \
-             lenses without"
+        "surface {surface} {what}; ghosts are those of centred lenses without mirrors and gradients"
     )]
-    NotPlain(SurfaceNumber),
+    NotPlain {
+        /// The surface.
+        surface: SurfaceNumber,
+        /// What it is, as the rest of a sentence.
+        what: &'static str,
+    },
     /// Fewer than two surfaces reflect.
     #[error("fewer than two surfaces reflect light; expected two where the index changes")]
     NoPair,
@@ -183,14 +187,16 @@ pub fn ghost_section(
 const FRONT: f64 = 0.2;
 
 fn check(system: &System<f64>) -> Result<(), GhostError> {
-    let is_other = |i: &usize| {
-        let surface = &system.surfaces[*i];
-        surface.mirror || surface.is_mounted() || surface.grin.is_some()
+    let other = |(i, surface): (usize, &Surface<f64>)| {
+        let what = match surface {
+            own if own.mirror => "is a mirror",
+            own if own.is_mounted() => "is not centred, or an ideal element",
+            own if own.grin.is_some() => "is in front of a GRIN medium",
+            _ => return None,
+        };
+        Some(GhostError::NotPlain { surface: i.into(), what })
     };
-    match (0..system.surfaces.len()).find(is_other) {
-        Some(i) => Err(GhostError::NotPlain(i.into())),
-        None => Ok(()),
-    }
+    system.surfaces.iter().enumerate().find_map(other).map_or(Ok(()), Err)
 }
 
 /// The surfaces where the index changes, the image plane left out.

@@ -58,7 +58,11 @@ impl GhostPath {
             if backwards { [behind, front] } else { [front, behind] }
         };
         let indices = steps.iter().enumerate().map(other).collect();
-        let tracer = Tracer::new(&system).map_err(|_error| GhostError::NotPlain(first.into()))?;
+        let refuse = |_error| GhostError::NotPlain {
+            surface: first.into(),
+            what: "cannot be traced backwards",
+        };
+        let tracer = Tracer::new(&system).map_err(refuse)?;
         Ok(Self { pair, steps, indices, vertices, system, tracer })
     }
 

@@ -148,7 +148,7 @@ pub(super) struct AnalyzeArgs {
 pub(super) fn parse_point(text: &str) -> Result<[f64; 2], String> {
     let number = |part: &str| part.trim().parse::<f64>().ok().filter(|v| v.is_finite());
     let pair = text.split_once(',').and_then(|(x, y)| Some([number(x)?, number(y)?]));
-    pair.ok_or_else(|| "expected two numbers in mm, as in `0.002,-0.001`".to_owned())
+    pair.ok_or_else(|| "expected two numbers, as in `0.002,-0.001`".to_owned())
 }
 
 /// The frequencies and the phase of a wave.

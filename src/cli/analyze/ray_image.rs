@@ -16,6 +16,7 @@ pub(super) struct RayImageJson {
     center: [f64; 2],
     /// The error of the largest density, as a share of it.
     error: f64,
+    reached: bool,
     rays: usize,
     milliseconds: f64,
     /// The number of columns and of rows, and the place of the last one in mm.
@@ -51,13 +52,12 @@ pub(super) fn images(run: &AnalysisRun) -> Vec<AtField<RayImageJson>> {
     let at = |field: &SelectedField| {
         let (found, milliseconds) = time_ms(|| {
             let half_width = half_width(run, field)?;
-            // Circles say how well the light is known where it is.
-            let radii = [0.25, 0.5, 0.75].map(|part| part * half_width);
-            image(run, field, half_width, &radii)
+            image(run, field, half_width, &[])
         });
         let keys = found.map(|found| RayImageJson {
             center: found.center,
             error: found.error,
+            reached: found.reached,
             rays: found.rays,
             milliseconds,
             columns: found.density.count,
@@ -96,8 +96,9 @@ impl TextLines for RayImageJson {
     fn lines(&self) -> Vec<String> {
         let Self { error, rays, milliseconds, .. } = self;
         let rays = counted(*rays, "ray");
+        let left = if self.reached { "" } else { ": the tolerance was not reached" };
         let mut lines = vec![
-            format!("{rays}, {milliseconds:.3} ms, error {:.1} % of the peak", 100.0 * error),
+            format!("{rays}, {milliseconds:.3} ms, error {:.1} % of the peak{left}", 100.0 * error),
             format!("{:>12}  {:>14}  {:>14}", "distance, mm", "along x", "along y"),
         ];
         let [x, y] = self.profiles();

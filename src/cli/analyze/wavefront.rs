@@ -283,6 +283,9 @@ impl TextLines for ZernikeJson {
             let [first, second] = [names[0][i], names[1][i]].map(aberration_name);
             lines.push(format!("{:>4}  {noll:>20}  {first:<22}  {fringe:>20}  {second}", i + 1));
         }
+        if !self.reached {
+            lines.push("the tolerance was not reached".to_owned());
+        }
         lines
     }
 

@@ -68,22 +68,22 @@ pub(super) struct SensorReport {
     /// The side of a pixel of the picture in um, which the sensor's own may differ from.
     pub(super) pixel_um: f64,
     pub(super) white_photons: f64,
-    /// At white, at mid grey and at a hundredth of white.
-    pub(super) signal_to_noise: [f64; 3],
+    /// At white, at mid grey and at a hundredth of white; `None` where pixels are saturated.
+    pub(super) signal_to_noise: [Option<f64>; 3],
     pub(super) saturated: f64,
 }
 
 impl Display for SensorReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [white, grey, dark] = self.signal_to_noise;
+        let ratio = |ratio: Option<f64>| {
+            ratio.map_or_else(|| "none (saturated)".to_owned(), |ratio| format!("{ratio:.1}"))
+        };
+        let [white, grey, dark] = self.signal_to_noise.map(ratio);
         let seconds = ShortNumber(self.seconds);
         writeln!(f, "sensor {}: {seconds} s at {} cd/m2", self.name, self.luminance)?;
         let [photons, pixel] = [self.white_photons, self.pixel_um].map(ShortNumber);
         writeln!(f, "  {photons} photons at white on a pixel of {pixel} um")?;
-        writeln!(
-            f,
-            "  signal to noise {white:.1} at white, {grey:.1} at mid grey, {dark:.1} at 1 %"
-        )?;
+        writeln!(f, "  signal to noise {white} at white, {grey} at mid grey, {dark} at 1 %")?;
         writeln!(f, "  {:.2} % saturated; {}", 100.0 * self.saturated, self.source)
     }
 }
@@ -127,7 +127,12 @@ impl PictureReport {
             "diffraction on: contrast changes by up to {change:.2} %, {left:.2} % are left, {cut:.2} % of \
              the light is cut off, at {points} points: {reason}"
         )?;
-        let refused = found.without_aberrations;
+        self.write_without_aberrations(f)
+    }
+
+    /// Why the spread by diffraction is not that of the aberrated pupil, if it was tried.
+    fn write_without_aberrations(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let refused = self.diffraction.as_ref().and_then(|found| found.without_aberrations);
         refused.map_or(Ok(()), |why| writeln!(f, "  aberrations are not in that spread: {why}"))
     }
 
@@ -201,6 +206,9 @@ impl Display for PictureReport {
         for OmittedEffect { effect, change, reason } in &self.left_out {
             let change = change.map(|c| format!("{:.2} %, ", 100.0 * c)).unwrap_or_default();
             writeln!(f, "left out: {effect} ({change}{reason})")?;
+            if *effect == "diffraction" {
+                self.write_without_aberrations(f)?;
+            }
         }
         self.gates.iter().flatten().try_for_each(|gate| write_gate(f, gate))?;
         self.sensor.iter().try_for_each(|sensor| write!(f, "{sensor}"))?;

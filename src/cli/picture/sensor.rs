@@ -216,8 +216,11 @@ impl PictureArgs {
             seconds,
             pixel_um: 1e3 * picture.frame.pitch,
             white_photons: photons(1.0),
-            signal_to_noise: [1.0, MID_GREY, 0.01]
-                .map(|v| sensor.signal_to_noise(photons(v), dark)),
+            signal_to_noise: [1.0, MID_GREY, 0.01].map(|level| {
+                let photons = photons(level);
+                let is_full = sensor.is_saturated(photons, dark);
+                (!is_full).then(|| sensor.signal_to_noise(photons, dark))
+            }),
             saturated: image.saturated,
         };
         (image.develop(picture), report)

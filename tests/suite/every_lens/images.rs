@@ -45,7 +45,9 @@ fn check_wavefront(model: &RayModel, field: FieldPoint) -> Result<bool, String> 
     let found = match wavefront(model, field, wavelength, ROUGH) {
         Ok(found) => found,
         // Refused by name.
-        Err(AnalysisError::IdealPath | AnalysisError::FoldedPupil) => return Ok(false),
+        Err(AnalysisError::IdealPath | AnalysisError::Afocal | AnalysisError::FoldedPupil) => {
+            return Ok(false);
+        }
         Err(why) => return Err(why.to_string()),
     };
     let rms = found.rms.value;
@@ -116,7 +118,7 @@ fn ghosts_grow_with_the_square_of_the_reflectance() {
         let rank = |share| rank_ghosts(model, model.primary, Coating::Flat(share));
         let [one, two] = match [rank(0.01), rank(0.02)] {
             [Ok(one), Ok(two)] => [one, two],
-            [Err(GhostError::NotPlain(_) | GhostError::NoPair), _] => return Ok(false),
+            [Err(GhostError::NotPlain { .. } | GhostError::NoPair), _] => return Ok(false),
             [Err(why), _] | [_, Err(why)] => return Err(why.to_string()),
         };
         for ghost in &one.ghosts {

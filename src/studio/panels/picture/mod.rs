@@ -449,10 +449,15 @@ fn readout(ui: &mut Ui, pictures: &[NamedPicture], (seen, white): (&[&Picture], 
         let [red, green, blue] = values.map(|value| 100.0 * value / white);
         let lux = luminance * picture.gray([column, row]);
         let photons = photon_count(lux, picture.frame.pitch, seconds);
-        let noise = sensor.signal_to_noise(photons, sensor.dark_current * seconds);
+        let dark = sensor.dark_current * seconds;
+        let noise = if sensor.is_saturated(photons, dark) {
+            "saturated".to_owned()
+        } else {
+            format!("SNR {:.1}", sensor.signal_to_noise(photons, dark))
+        };
         let text = format!(
             "{}, pixel {column}, {row}: red {red:.1}, green {green:.1}, blue {blue:.1} % of white, \
-             SNR {noise:.1}",
+             {noise}",
             capitalize(named.name)
         );
         ui.label(RichText::new(text).small()).on_hover_text(EXPOSURE);
