@@ -31,6 +31,7 @@ pub struct Derivatives {
 
 impl Derivatives {
     /// The same, 0 where an error of this standard deviation changes the value by rounding alone.
+    #[must_use]
     pub fn without_rounding(self, deviation: f64) -> Self {
         let above = |by: f64, deviation: f64| {
             if (by * deviation).abs() <= ROUNDING * self.value.abs() { 0.0 } else { by }
