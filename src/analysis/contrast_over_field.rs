@@ -56,7 +56,7 @@ fn contrast(
     interrupted: &(dyn Fn() -> bool + Sync),
 ) -> (Result<MtfCurve, AnalysisError>, Option<AnalysisError>) {
     match polychromatic_diffraction_mtf_unless(model, field, frequencies, accuracy, interrupted) {
-        Err(why @ (AnalysisError::FoldedPupil | AnalysisError::IrregularPupil)) => {
+        Err(why) if why.is_of_diffraction() => {
             (polychromatic_geometric_mtf(model, field, frequencies, accuracy), Some(why))
         }
         found => (found, None),

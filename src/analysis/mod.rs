@@ -140,14 +140,11 @@ pub enum AnalysisError {
     #[error("no chief ray: the ray through the middle of the pupil does not reach the image")]
     NoChief,
     /// The lens has no focal length: its light meets in no point.
-    #[error(
-        "the lens is afocal: its light meets in no point, of which diffraction could be told; expected a lens \
-         that focuses it, as a paraxial one behind it does"
-    )]
+    #[error("the lens is afocal: its light meets in no point, of which diffraction could be told")]
     Afocal,
-    /// The image plane is displaced to the exit pupil, or beyond it.
+    /// All positions of a displaced image plane lie at the exit pupil, or beyond it.
     #[error(
-        "the image plane is displaced to the exit pupil or beyond it; expected smaller displacements"
+        "every position of the image plane lies at the exit pupil or beyond it; expected smaller shifts"
     )]
     BeyondPupil,
     /// Two rays of the pupil have the same direction cosines on the reference sphere.
@@ -183,6 +180,11 @@ pub enum AnalysisError {
 }
 
 impl AnalysisError {
+    /// True if the lens has an image by rays, but none by diffraction from one exit pupil.
+    pub fn is_of_diffraction(&self) -> bool {
+        matches!(self, Self::Afocal | Self::FoldedPupil | Self::IrregularPupil)
+    }
+
     /// True if rays are lost or not limited; false if the lens has light, but not this number.
     pub fn is_loss_of_light(&self) -> bool {
         match self {

@@ -176,9 +176,13 @@ impl ReferenceSphere {
     }
 
     /// The place of a point about the centre at which linear phases of the sphere's cosines are those of light from
-    /// its points: across the axis and along the light, in mm.
+    /// its points: across the axis and along the light, in mm. Near enough that it lies behind the exit pupil.
     pub(super) fn place_of(&self, linear: [f64; 3]) -> [f64; 3] {
-        let rest = 1.0 - linear[2] * self.form.curvature() / self.direction.z.abs();
+        let [x, y, z] = linear;
+        let Vec3 { x: dx, y: dy, z: dz } = self.direction;
+        // Along the chief ray.
+        let along = dx * x + dy * y + dz.abs() * z;
+        let rest = 1.0 - along * self.form.curvature();
         if rest > 0.0 { linear.map(|part| part / rest) } else { linear }
     }
 

@@ -80,6 +80,9 @@ pub(super) struct DiffractionLight {
 
 /// The change of contrast by diffraction over νλF, at most, for five families of aberrations.
 const LARGEST_CHANGE: f64 = 1.27;
+/// The reason why diffraction is left out of a scene without contrast.
+const UNIFORM: &str =
+    "the same light comes from every direction, of which no blur changes anything but the edge";
 /// The parts of the highest frequency, and of the way to the corner, at which contrasts are compared.
 const COMPARED: [f64; 3] = [0.25, 0.5, 1.0];
 const PLACES: [f64; 3] = [0.0, 0.7, 1.0];
@@ -92,6 +95,10 @@ const MARGINS: [f64; 3] = [200.0, 60.0, 25.0];
 const RINGS: usize = 12;
 
 impl DiffractionLight {
+    fn off(report: DiffractionReport) -> Self {
+        Self { report, parts: None }
+    }
+
     /// Diffraction for a frame of pictures of a model in some colours; it is put in if it changes contrast by
     /// more than a tolerance and less is left then.
     ///
@@ -109,7 +116,10 @@ impl DiffractionLight {
         let frequency = (0.5 / frame.pitch).min(cutoff);
         let bound = (LARGEST_CHANGE * frequency / cutoff).min(1.0);
         let without = |reason| DiffractionReport::off(bound, frequency, reason);
-        let off = |reason| Ok(Self { report: without(reason), parts: None });
+        let off = |reason| Ok(Self::off(without(reason)));
+        if scene.is_uniform() {
+            return Ok(Self::off(DiffractionReport::off(0.0, frequency, UNIFORM)));
+        }
         if bound <= tolerance {
             return off("at most 1.27 nu lambda F of contrast");
         }

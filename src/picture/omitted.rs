@@ -90,7 +90,6 @@ pub fn omitted_beside(
 
 /// The losses, which are known where the lens has bare surfaces and no mirrors.
 fn omitted_losses(model: &RayModel) -> OmittedEffect {
-    // Bare surfaces on the axis.
     let ranking = rank_ghosts(model, model.primary, Coating::Bare).ok();
     let reason = if ranking.is_some() {
         "of the light on the axis bare surfaces would take this; white loses the same, so that a picture exposed \

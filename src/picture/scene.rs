@@ -123,6 +123,11 @@ impl Scene {
         }
     }
 
+    /// True if the same light comes from every direction: no blur changes its image but at the edge of the light.
+    pub fn is_uniform(&self) -> bool {
+        self.layers.is_empty()
+    }
+
     /// The radiance of the background in a colour of three, or its luminance as the only one.
     pub(super) fn seen_background(&self, color: usize, colors: usize) -> f64 {
         if colors == 3 { self.background[color] } else { luminance(self.background) }

@@ -47,37 +47,53 @@ fn travel_warning(travels: &[AdjustmentTravel]) -> Option<String> {
     })
 }
 
-/// Warnings of tolerances that are possible but seldom meant.
+/// Warnings of tolerances that are possible but seldom meant, one for each kind of them.
 fn sheet_warnings(sheet: &ToleranceSheet, lens: &NominalLens) -> Vec<String> {
-    let mut warnings = Vec::new();
-    let mut places: BTreeMap<Perturbation, usize> = BTreeMap::new();
-    for (place, tolerance) in sheet.errors.iter().enumerate() {
-        let error = tolerance.error;
-        let name = format!("errors[{place}] (`{}`)", error.kind.name());
-        if let Some(first) = places.insert(error, place) {
-            warnings.push(format!("{name} is the same error as errors[{first}]; both count"));
-        }
-        warnings.extend(unusual_place(error, lens).map(|why| format!("{name} {why}")));
-    }
-    warnings
+    let mut counts: BTreeMap<Perturbation, usize> = BTreeMap::new();
+    sheet.errors.iter().for_each(|own| *counts.entry(own.error).or_default() += 1);
+    let listed = |is_meant: &dyn Fn(Perturbation, usize) -> bool| -> Vec<Perturbation> {
+        let chosen = counts.iter().filter(|(error, count)| is_meant(**error, **count));
+        chosen.map(|(error, _)| *error).collect()
+    };
+    let surface = |error: Perturbation| lens.systems[lens.primary].surfaces.get(error.first);
+    let is_of_glass = |kind| matches!(kind, PerturbationKind::Index | PerturbationKind::Abbe);
+    let repeated = listed(&|_, count| count > 1);
+    let of_air = listed(&|error, _| {
+        let is_air = surface(error).is_some_and(|own| own.index == 1.0 && own.grin.is_none());
+        is_of_glass(error.kind) && is_air
+    });
+    let alone = listed(&|error, _| {
+        let is_mirror = surface(error).is_some_and(|own| own.mirror);
+        error.kind.moves_a_body() && error.first == error.last && !is_mirror
+    });
+    [
+        (repeated, "listed several times, and counted as often"),
+        (of_air, "an error of the air behind the surface"),
+        (alone, "moves one surface alone; `last` names the rear surface of an element"),
+    ]
+    .into_iter()
+    .filter(|(errors, _)| !errors.is_empty())
+    .map(|(errors, what)| format!("{}: {what}", names_of(&errors)))
+    .collect()
 }
 
-/// What is unusual about the place of an error, as the rest of a sentence.
-fn unusual_place(error: Perturbation, lens: &NominalLens) -> Option<String> {
-    let system = &lens.systems[lens.primary];
-    let surface = system.surfaces.get(error.first)?;
-    let number = SurfaceNumber::new(error.first);
-    match error.kind {
-        PerturbationKind::Index | PerturbationKind::Abbe
-            if surface.index == 1.0 && surface.grin.is_none() =>
-        {
-            Some(format!("is of the air behind surface {number}"))
+/// The number of errors that a warning names.
+const NAMED: usize = 3;
+
+/// The names of some errors with their surfaces, and the number of the others.
+fn names_of(errors: &[Perturbation]) -> String {
+    let name = |error: &Perturbation| {
+        let [first, last] = [error.first, error.last].map(SurfaceNumber::new);
+        if first == last {
+            format!("`{}` of surface {first}", error.kind.name())
+        } else {
+            format!("`{}` of surfaces {first}-{last}", error.kind.name())
         }
-        kind if kind.moves_a_body() && error.first == error.last && !surface.mirror => Some(
-            format!("moves surface {number} alone; `last` names the rear surface of an element"),
-        ),
-        _ => None,
-    }
+    };
+    let names: Vec<String> = errors.iter().take(NAMED).map(name).collect();
+    let others = errors.len().saturating_sub(NAMED);
+    let more = if others > 0 { format!(" and {others} more") } else { String::new() };
+    format!("{}{more}", names.join(", "))
 }
 
 /// A warning of the errors that a class leaves out at surfaces beside a GRIN medium.

@@ -36,6 +36,15 @@ impl BoxedQuadratic {
         self.ranges.iter().any(|[low, high]| low < high && (low.is_finite() || high.is_finite()))
     }
 
+    /// The same function without ends of ranges but for variables that have no range at all.
+    #[must_use]
+    pub fn without_stops(&self) -> Self {
+        let free = |range: &[f64; 2]| {
+            if range[0] < range[1] { [f64::NEG_INFINITY, f64::INFINITY] } else { *range }
+        };
+        Self { matrix: self.matrix.clone(), ranges: self.ranges.iter().map(free).collect() }
+    }
+
     /// The value at variables, for a centre.
     pub fn value(&self, variables: &[f64], center: &[f64]) -> f64 {
         let offsets: Vec<f64> = variables.iter().zip(center).map(|(y, c)| y - c).collect();

@@ -43,7 +43,7 @@ impl Compensation {
         let in_lens: Vec<Perturbation> = parts().filter_map(AdjustedPart::in_lens).collect();
         let found = sensitivities(&scene.lens, &scene.beam, scene.options, &in_lens)?;
         let mut found = found.into_iter();
-        let landings = SensorRays::new(scene)?;
+        let landings = SensorRays::new(scene, adjustments[0].travel)?;
         let effect = |part: AdjustedPart| match part {
             AdjustedPart::Lens(error) => found.next().map(|effect| AdjustmentEffect {
                 parity: ErrorParity::of(error.kind),
@@ -56,22 +56,24 @@ impl Compensation {
     }
 }
 
-/// The rays of a lens as designed at its best focus.
+/// The rays of a lens as designed at its best focus within a travel.
 struct SensorRays {
     /// For each field the point and the slopes of each ray, with its weight.
     fields: Vec<Vec<([f64; 4], f64)>>,
 }
 
 impl SensorRays {
-    fn new(scene: &ToleranceScene) -> Result<Self, ToleranceError> {
+    /// Those of a lens whose focus has this travel.
+    fn new(scene: &ToleranceScene, travel: f64) -> Result<Self, ToleranceError> {
         let systems = &scene.lens.systems;
         let image = systems[scene.lens.primary].vertex_positions().last().copied();
         let rear = Rear { systems, image: image.unwrap_or_default() };
         let (merits, mut fields) = merits_of(&rear, &scene.beam, scene.options)?;
+        let focus = merits.focus.clamp(-travel, travel);
         for (ray, _) in fields.iter_mut().flatten() {
             let [_, _, u, v] = *ray;
-            ray[0] += merits.focus * u;
-            ray[1] += merits.focus * v;
+            ray[0] += focus * u;
+            ray[1] += focus * v;
         }
         Ok(Self { fields })
     }

@@ -16,7 +16,7 @@ use super::pupils::{FieldPupils, PupilTreatment, ScenePupils};
 use super::sensitivity::{RaySensitivity, Sensitivity, second_derivatives, sensitivities_until};
 use super::sweep::SweptField;
 use super::two_planes::TwoPlanes;
-use super::{FocusTreatment, StopTest, ToleranceError, ToleranceScene, refuse_if_stopped};
+use super::{SpotMoments, StopTest, ToleranceError, ToleranceScene, refuse_if_stopped};
 use crate::lens::Perturbation;
 use crate::math::dot;
 use crate::pupil::EdgeRay;
@@ -51,9 +51,9 @@ pub struct RayEffects {
     combinations: ErrorCombinations,
     /// The best common focus of the lens as designed, in mm from its image plane.
     focus: f64,
-    /// The second derivative of the mean square spot by each error, at the image plane and at the best
-    /// focus of the lens as designed, in mm² per squared unit; `None` where it is left out.
-    second: Option<Vec<[f64; 2]>>,
+    /// The second derivatives of the moments of the mean spot by each error, per squared unit; `None` where they are
+    /// left out.
+    second: Option<Vec<SpotMoments<f64>>>,
 }
 
 /// The effects on the rays of one field, x of all rays before y of all, times the roots of their weights
@@ -102,7 +102,7 @@ impl RayEffects {
         if open_tracers(systems)?.iter().all(Tracer::has_error_slopes) {
             let mut effects = Self::swept(scene, errors, (&rays, focus), stop)?;
             if second == SecondDerivatives::Traced {
-                let exact = second_derivatives(scene, &different, focus, stop)?;
+                let exact = second_derivatives(scene, &different, stop)?;
                 effects.second = Some(place_of.iter().map(|place| exact[*place]).collect());
             }
             return Ok(effects);
@@ -241,7 +241,7 @@ impl RayEffects {
             (field.displacement, field.bend) = both;
             field
         };
-        let exact: Vec<[f64; 2]> = found.iter().map(|own| own.second_at(focus)).collect();
+        let exact: Vec<_> = found.iter().map(Sensitivity::second_moments).collect();
         Self {
             fields: folded_fields(scene).iter().map(field).collect(),
             parities: found.iter().map(|own| ErrorParity::of(own.error.kind)).collect(),
@@ -273,13 +273,9 @@ impl RayEffects {
         self.focus
     }
 
-    /// The second derivatives of the mean square at an image plane.
-    pub(super) fn second(&self, focus: FocusTreatment) -> Option<Vec<f64>> {
-        let plane = match focus {
-            FocusTreatment::Fixed => 0,
-            FocusTreatment::Refocused => 1,
-        };
-        Some(self.second.as_ref()?.iter().map(|both| both[plane]).collect())
+    /// The second derivatives of the mean square at an image plane that is displaced by `shift`.
+    pub(super) fn second(&self, shift: f64) -> Option<Vec<f64>> {
+        Some(self.second.as_ref()?.iter().map(|moments| moments.at(shift)).collect())
     }
 
     /// The mean products at an image plane that is displaced by `shift`.

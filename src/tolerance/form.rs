@@ -212,33 +212,38 @@ impl QuadraticForm {
     /// with others included.
     ///
     /// Where compensators may end at stops, it is `½ σ² E[∂²S/∂p²]` as the mean over all errors from none to those of
-    /// the tolerances (Price, IRE Trans. Inf. Theory 4 (1958) 69: exact for normal errors), with stops by random
-    /// lenses, to about 1 %.
+    /// the tolerances, by random lenses (Price, IRE Trans. Inf. Theory 4 (1958) 69: exact for normal errors). What
+    /// stops cost is scaled for other errors, so that the sum is that of the lenses whatever their distributions.
     ///
     /// # Errors
     /// Correlations that no errors can have.
     pub fn growth(&self, sheet: &ToleranceSheet) -> Result<Vec<f64>, ToleranceError> {
         let mixture = ErrorMixture::new(sheet)?;
-        Ok(self.growth_with_stops(&mixture, self.stop_curvature(sheet)?.as_ref()))
+        Ok(self.growth_by(&mixture, self.stop_curvature(sheet)?.as_ref()))
     }
 
-    /// The expected mean square spot radius in mm². Compensators that may end at a stop count as if they had none.
+    /// The expected mean square spot radius in mm². Compensators that may travel to a stop count as if they had none.
     ///
     /// # Errors
     /// Correlations that no errors can have.
     pub fn expectation(&self, sheet: &ToleranceSheet) -> Result<f64, ToleranceError> {
-        let mixture = ErrorMixture::new(sheet)?;
-        let (nominal, held) = if self.has_stops() {
-            (self.nominal, None)
-        } else {
-            (self.as_designed(), self.held_curvature())
-        };
-        let growth = self.growth_with_stops(&mixture, held.as_ref());
-        Ok(nominal + growth.iter().sum::<f64>())
+        let form = self.without_stops();
+        let growth = form.growth_by(&ErrorMixture::new(sheet)?, form.held_curvature().as_ref());
+        Ok(form.as_designed() + growth.iter().sum::<f64>())
+    }
+
+    /// The same form without stops that a compensator may travel to.
+    fn without_stops(&self) -> Self {
+        let mut form = self.clone();
+        if let Some(adjusted) = &mut form.adjusted {
+            adjusted.travel = adjusted.travel.without_stops();
+        }
+        form
     }
 
     /// The second derivatives by the best adjustments of the mean square that stops cost, as the mean over lenses
-    /// with random errors; `None` where nothing has one.
+    /// with random errors, times a factor with which all errors together cost what these lenses do; `None` where
+    /// nothing has a stop.
     pub(super) fn stop_curvature(
         &self,
         sheet: &ToleranceSheet,
@@ -267,7 +272,7 @@ impl QuadraticForm {
         self.second.of(i, j) + cost
     }
 
-    fn growth_with_stops(&self, mixture: &ErrorMixture, stops: Option<&DMatrix<f64>>) -> Vec<f64> {
+    fn growth_by(&self, mixture: &ErrorMixture, stops: Option<&DMatrix<f64>>) -> Vec<f64> {
         let of = |i: usize| {
             let covariances = mixture.covariances(i).iter();
             let product =
@@ -377,11 +382,7 @@ impl FixedForm {
             first: DVector::from_fn(count, |m, _| first(m)),
             among: &held + 2.0 * &edge.among,
             held,
-            exact: effects.second(if focus.shift(effects, compensation) == 0.0 {
-                FocusTreatment::Fixed
-            } else {
-                focus
-            }),
+            exact: effects.second(focus.shift(effects, compensation)),
             combinations: ErrorCombinations::clone(effects.combinations()),
             focus: focus.shift(effects, compensation),
             by_adjustment: DVector::zeros(adjustments),

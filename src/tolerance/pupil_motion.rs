@@ -50,7 +50,7 @@ impl PupilMotion {
         for (with, without) in with.iter().zip(without) {
             let (expected, held) = (with.expectation(sheet)?, without.expectation(sheet)?);
             let twice = 2.0 * held.max(f64::MIN_POSITIVE);
-            let apart = |i: usize| with.first[i] - without.first[i];
+            let apart = |i: usize| with.derivatives(i).first - without.derivatives(i).first;
             let mean = ((expected - held) / twice).abs() + square;
             let found = [mean, deviation(sheet, apart) / twice];
             if found[0] + found[1] > change[0] + change[1] {

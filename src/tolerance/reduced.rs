@@ -9,7 +9,8 @@ use super::form::{AdjustedForm, QuadraticForm};
 use super::mixture::ErrorMixture;
 use super::{StopTest, ToleranceError, refuse_if_stopped};
 use crate::lens::Tolerance;
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use crate::solve::scaled_pseudoinverse;
+use nalgebra::{DMatrix, DVector, Matrix2, SymmetricEigen, Vector2};
 use rayon::prelude::*;
 
 /// The share of the form whose scatter, though not its mean, is left out of samples.
@@ -168,7 +169,7 @@ const LINEAR: usize = 0;
 const LENSES: u64 = 256;
 
 /// The number of lenses that tell how often compensators are at their stops, and their seed.
-const AT_STOPS: u64 = 4_000;
+const AT_STOPS: u64 = 8_000;
 const SEED: u64 = 0x57_0950;
 /// The shares of the variances of errors, and their weights in a mean over all of them (Gauss and Legendre).
 const VARIANCES: [[f64; 2]; 3] = [
@@ -262,12 +263,10 @@ impl ReducedForm {
         sum.max(0.0) + self.adjusted.as_ref().map_or(0.0, cost)
     }
 
-    /// The second derivatives by the best adjustments of what the ends of their travel cost, as the mean over random
-    /// lenses and over the variances of their errors from none to those of the tolerances; `None` at the fixed image
+    /// The second derivatives by the best adjustments of what the ends of their travels cost, as the mean over random
+    /// lenses and over the variances of their errors from none to those of the tolerances; times a factor with which
+    /// they cost what the lenses do, since the mean is exact for normal errors alone. `None` at the fixed image
     /// plane.
-    ///
-    /// # Errors
-    /// None but those of lenses that are stopped.
     pub(super) fn stop_curvature(
         &self,
         tolerances: &[Tolerance],
@@ -282,7 +281,20 @@ impl ReducedForm {
             })
         };
         let sum = lenses.iter().fold(DMatrix::zeros(count, count), |sum, own| sum + of_lens(own));
-        Ok(Some(sum / lenses.len() as f64))
+        let curvature = sum / lenses.len() as f64;
+        let by_curvature = 0.5 * (&curvature * self.covariance_of_adjustments(tolerances)).trace();
+        let cost = growth_of_cost(adjusted, &lenses, (&curvature, by_curvature));
+        let factor = if by_curvature > 0.0 { (cost / by_curvature).max(0.0) } else { 1.0 };
+        Ok(Some(curvature * factor))
+    }
+
+    /// The covariance of the best adjustments, whatever their travel.
+    fn covariance_of_adjustments(&self, tolerances: &[Tolerance]) -> DMatrix<f64> {
+        let rows = self.directions.rows(LINEAR + 1, self.own - LINEAR - 1);
+        let scaled = DMatrix::from_fn(rows.nrows(), rows.ncols(), |row, k| {
+            rows[(row, k)] * tolerances[k].distribution.deviation()
+        });
+        &scaled * scaled.transpose()
     }
 
     /// The adjustments of a lens with some errors within their travel, focus first; none at the fixed
@@ -299,6 +311,33 @@ impl AdjustedForm {
     fn best_of(&self, changes: &[f64], factor: f64) -> Vec<f64> {
         self.nominal.iter().zip(changes).map(|(nominal, by)| nominal + factor * by).collect()
     }
+}
+
+/// The growth of what the ends of travels cost by the errors of random lenses, in mm². Its scatter is mostly that of
+/// its first and second derivatives there, of which the means are known.
+fn growth_of_cost(
+    adjusted: &AdjustedForm,
+    lenses: &[ErrorMultiples],
+    (curvature, by_curvature): (&DMatrix<f64>, f64),
+) -> f64 {
+    let (slope, _) = adjusted.travel.derivatives_of_least(&adjusted.nominal);
+    let nominal = adjusted.cost(&adjusted.nominal);
+    let number = |errors: &ErrorMultiples| {
+        let change = DVector::from_column_slice(&errors.adjustments);
+        let square = 0.5 * change.dot(&(curvature * &change)) - by_curvature;
+        let cost = adjusted.cost(&adjusted.best_of(&errors.adjustments, 1.0)) - nominal;
+        (Vector2::new(slope.dot(&change), square), cost)
+    };
+    let numbers: Vec<(Vector2<f64>, f64)> = lenses.iter().map(number).collect();
+    let count = numbers.len() as f64;
+    let known = numbers.iter().map(|own| own.0).sum::<Vector2<f64>>() / count;
+    let mean = numbers.iter().map(|own| own.1).sum::<f64>() / count;
+    let products = numbers.iter().map(|(own, _)| (own - known) * (own - known).transpose());
+    let with_cost = numbers.iter().map(|(own, cost)| (own - known) * (cost - mean));
+    let (products, with_cost): (Matrix2<f64>, Vector2<f64>) = (products.sum(), with_cost.sum());
+    let products = DMatrix::from_column_slice(2, 2, products.as_slice());
+    let factors = scaled_pseudoinverse(&products) * with_cost;
+    mean - factors.dot(&known)
 }
 
 /// The additions of errors to the form: to first order, to second order, and to the best adjustments.

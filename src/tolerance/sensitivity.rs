@@ -7,8 +7,8 @@
 use super::merits::{ImageRays, Rear, merits, merits_of, open_tracers};
 use super::spot::ImageRay;
 use super::{
-    Beam, ColourRays, FieldBeam, MeritOptions, Merits, NominalLens, StopTest, ToleranceError,
-    ToleranceScene, perturb, refuse_if_stopped,
+    Beam, ColourRays, FieldBeam, MeritOptions, Merits, NominalLens, SpotMoments, StopTest,
+    ToleranceError, ToleranceScene, perturb, refuse_if_stopped,
 };
 use crate::lens::{Perturbation, System};
 use crate::math::{Dual, Real, Vec3};
@@ -30,11 +30,13 @@ pub struct Derivatives {
 }
 
 impl Derivatives {
-    /// The same, 0 where an error of this standard deviation changes the value by rounding alone.
+    /// The same, 0 where an error of this standard deviation changes the value by rounding alone; as it is for one
+    /// without scatter.
     #[must_use]
     pub fn without_rounding(self, deviation: f64) -> Self {
         let above = |by: f64, deviation: f64| {
-            if (by * deviation).abs() <= ROUNDING * self.value.abs() { 0.0 } else { by }
+            let is_rounding = (by * deviation).abs() <= ROUNDING * self.value.abs();
+            if is_rounding && deviation > 0.0 { 0.0 } else { by }
         };
         let (first, second) =
             (above(self.first, deviation), above(self.second, deviation * deviation));
@@ -107,11 +109,11 @@ impl Sensitivity {
         self.merits.mean_square_focused().into()
     }
 
-    /// The second derivative of the mean square spot in mm² per squared unit, at the image plane and at
-    /// one that is displaced by `shift` mm.
-    pub(super) fn second_at(&self, shift: f64) -> [f64; 2] {
-        let displaced = self.merits.mean.at(Jet2::from_f64(shift));
-        [self.merits.mean.a, displaced].map(|jet| jet.slope[0].slope[0])
+    /// The second derivatives of the moments of the mean spot, per squared unit.
+    pub(super) fn second_moments(&self) -> SpotMoments<f64> {
+        let SpotMoments { a, b, c } = self.merits.mean;
+        let [a, b, c] = [a, b, c].map(|jet| jet.slope[0].slope[0]);
+        SpotMoments { a, b, c }
     }
 
     /// The displacement of the best common focus, in mm.
@@ -152,21 +154,19 @@ pub(super) fn sensitivities_until(
     errors.par_iter().map(one).collect()
 }
 
-/// The second derivatives of the mean square spot by each error in mm² per squared unit, at the image
-/// plane and at one that is displaced by `shift` mm, until `stop` says so.
+/// The second derivatives of the moments of the mean spot by each error, per squared unit, until `stop` says so.
 ///
 /// # Errors
 /// As those of [`sensitivities`], and [`ToleranceError::Stopped`].
 pub(super) fn second_derivatives(
     scene: &ToleranceScene,
     errors: &[Perturbation],
-    shift: f64,
     stop: StopTest<'_>,
-) -> Result<Vec<[f64; 2]>, ToleranceError> {
+) -> Result<Vec<SpotMoments<f64>>, ToleranceError> {
     let stages = Stages::new(&scene.lens, &scene.beam, scene.options)?;
     let one = |error: &Perturbation| {
         refuse_if_stopped(stop)?;
-        Ok(stages.sensitivity(&scene.lens, scene.options, *error)?.second_at(shift))
+        Ok(stages.sensitivity(&scene.lens, scene.options, *error)?.second_moments())
     };
     errors.par_iter().map(one).collect()
 }

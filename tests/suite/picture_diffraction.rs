@@ -217,3 +217,15 @@ fn aberrations_of_a_part_of_a_wave_have_the_contrast_of_diffraction() {
         assert!(error < 0.05, "{error} {place}");
     }
 }
+
+/// The same light from every direction: no spread changes it, and nothing is computed for one.
+#[test]
+fn a_scene_without_contrast_has_no_diffraction() {
+    let out = std::env::temp_dir().join("aplanat-even.png").display().to_string();
+    let lens = "lenses/achromat_ac254_100.json";
+    let base = ["picture", lens, "--scene", "white", "--gray", "--pixels", "24x16"];
+    let found = done_json(&[&base[..], &["--pitch", "5", "--out", &out]].concat(), "");
+    assert_eq!(found["reached"], true, "{found}");
+    assert_eq!(found["diffraction"]["on"], false, "{found}");
+    assert_eq!(found["diffraction"]["change"].as_f64(), Some(0.0), "{found}");
+}

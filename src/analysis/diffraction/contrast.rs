@@ -251,10 +251,10 @@ pub fn polychromatic_diffraction_mtf_unless(
 
 /// The contrast by diffraction of a field at one wavelength and frequency against displacements of the
 /// image plane along the light in mm, from the rays of one pupil; the frequency of a point is the
-/// displacement. Errors are those of [`diffraction_mtf`].
+/// displacement. Errors are those of [`diffraction_mtf`]; planes at the exit pupil or beyond it are left out.
 ///
 /// # Errors
-/// As of [`diffraction_mtf`], and a plane at the exit pupil or beyond it.
+/// As of [`diffraction_mtf`], and no plane that is left.
 pub fn through_focus_mtf(
     model: &RayModel,
     field: FieldPoint,
@@ -272,6 +272,11 @@ pub fn through_focus_mtf(
     let far = is_uncertain(&sphere, &region)
         .then(|| DisplacedContrast::new(&mut traces, &doubled, coarse))
         .transpose()?;
+    let reached: Vec<f64> =
+        displacements.iter().copied().filter(|shift| sphere.displaced(*shift).is_ok()).collect();
+    if reached.is_empty() {
+        return Err(AnalysisError::BeyondPupil);
+    }
     let at = |shift: &f64| {
         let mut values = near.at(frequency, *shift)?;
         if let Some(far) = &far {
@@ -281,7 +286,7 @@ pub fn through_focus_mtf(
         let [tangential, sagittal] = values;
         Ok(MtfPoint { frequency: *shift, tangential, sagittal })
     };
-    displacements.iter().map(at).collect()
+    reached.iter().map(at).collect()
 }
 
 /// The contrast of a pupil against the displacement of the image plane.

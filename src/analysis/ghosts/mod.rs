@@ -24,14 +24,15 @@ use rayon::prelude::*;
 /// The lens cannot be searched for ghosts.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum GhostError {
-    /// A surface is a mirror, decentred or tilted, or a gradient begins there.
+    /// A surface is a mirror, decentred, tilted or an ideal element, a gradient begins there, or light cannot be
+    /// traced through it.
     #[error(
         "surface {surface} {what}; ghosts are those of centred lenses without mirrors and gradients"
     )]
     NotPlain {
         /// The surface.
         surface: SurfaceNumber,
-        /// What it is, as the rest of a sentence.
+        /// Its kind, as the rest of a sentence.
         what: &'static str,
     },
     /// Fewer than two surfaces reflect.

@@ -43,7 +43,7 @@ pub(super) fn distortions(run: &AnalysisRun) -> Vec<AtField<DistortionJson>> {
         });
         AtField::new(field, keys)
     };
-    run.fields.iter().map(at).collect()
+    run.at_each_field(at)
 }
 
 impl TextLines for DistortionJson {
@@ -171,7 +171,7 @@ pub(super) fn curvatures(run: &AnalysisRun) -> Vec<AtField<FieldCurvatureJson>> 
         });
         AtField::new(field, keys)
     };
-    run.fields.iter().map(at).collect()
+    run.at_each_field(at)
 }
 
 impl TextLines for FieldCurvatureJson {

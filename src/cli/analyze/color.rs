@@ -56,7 +56,7 @@ pub(super) fn lateral_colors(run: &AnalysisRun) -> Vec<AtField<LateralColorJson>
         });
         AtField::new(field, keys)
     };
-    run.fields.iter().map(at).collect()
+    run.at_each_field(at)
 }
 
 impl TextLines for LateralColorJson {
@@ -196,7 +196,7 @@ pub(super) fn footprints(
         });
         AtField::new(field, keys)
     };
-    Ok(run.fields.iter().map(at).collect())
+    Ok(run.at_each_field(at))
 }
 
 impl TextLines for FootprintJson {

@@ -110,7 +110,7 @@ pub(super) fn contrasts(run: &AnalysisRun) -> Vec<AtField<MtfJson>> {
         });
         AtField::new(chosen, keys)
     };
-    run.fields.iter().map(at).collect()
+    run.at_each_field(at)
 }
 
 impl TextLines for MtfJson {
@@ -247,7 +247,7 @@ pub(super) fn through_focus(run: &AnalysisRun) -> Vec<AtField<FocusContrastJson>
         let keys = found.map(|positions| FocusContrastJson { frequency, milliseconds, positions });
         AtField::new(field, keys)
     };
-    run.fields.iter().map(at).collect()
+    run.at_each_field(at)
 }
 
 impl TextLines for FocusContrastJson {

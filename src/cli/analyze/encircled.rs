@@ -122,7 +122,7 @@ pub(super) fn encircled(run: &AnalysisRun, asked: &[f64]) -> Vec<AtField<Encircl
         });
         AtField::new(field, found.map(|found| found.keys(run, ms)))
     };
-    run.fields.iter().map(at).collect()
+    run.at_each_field(at)
 }
 
 /// Circles with the light within them: those that are listed, and those of a drawing.

@@ -52,7 +52,7 @@ pub(super) fn fans(run: &AnalysisRun) -> Vec<AtField<FanJson>> {
         });
         AtField::new(field, lit.map(keys))
     };
-    run.fields.iter().map(at).collect()
+    run.at_each_field(at)
 }
 
 impl ColorFanJson {

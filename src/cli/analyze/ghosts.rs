@@ -94,7 +94,7 @@ pub(super) fn ghost_lists(
         let lit = if arrives { Ok(()) } else { check_light(&run.model, field.traced) };
         Ok(AtField::new(field, lit.map(|()| keys)))
     };
-    run.fields.iter().map(at).collect()
+    run.at_each_field(at).into_iter().collect()
 }
 
 fn keys(

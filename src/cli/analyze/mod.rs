@@ -7,6 +7,7 @@ mod color;
 mod contrast;
 mod contrast_over_field;
 mod csv;
+mod each_field;
 mod encircled;
 mod fan;
 mod field_charts;
@@ -449,6 +450,11 @@ impl AnalyzeArgs {
             return Err(CliError::Input(format!(
                 "--frequencies: found {count} of them; expected at most {MOST_FREQUENCIES}"
             )));
+        }
+        if self.what == AnalysisKind::ThroughFocusMtf && frequencies.first() == Some(&0.0) {
+            let text =
+                "--frequencies: found 0; expected cycles/mm, above zero, for through-focus-mtf";
+            return Err(CliError::Input(text.to_owned()));
         }
         match frequencies.iter().find(|nu| !(nu.is_finite() && **nu >= 0.0)) {
             Some(wrong) => Err(CliError::Input(format!(

@@ -85,7 +85,7 @@ pub(super) fn point_spreads(run: &AnalysisRun) -> Vec<AtField<PointSpreadJson>> 
         });
         AtField::new(field, keys)
     };
-    run.fields.iter().map(at).collect()
+    run.at_each_field(at)
 }
 
 /// Intensities that are drawn.

@@ -66,7 +66,7 @@ pub(super) fn images(run: &AnalysisRun) -> Vec<AtField<RayImageJson>> {
         });
         AtField::new(field, keys)
     };
-    run.fields.iter().map(at).collect()
+    run.at_each_field(at)
 }
 
 impl RayImageJson {
@@ -182,7 +182,7 @@ pub(super) fn energies(run: &AnalysisRun, asked: &[f64]) -> Vec<AtField<RayEnerg
         });
         AtField::new(field, keys)
     };
-    run.fields.iter().map(at).collect()
+    run.at_each_field(at)
 }
 
 impl TextLines for RayEnergyJson {

@@ -47,7 +47,7 @@ pub(super) fn spots(run: &AnalysisRun) -> Vec<AtField<SpotJson>> {
         let points = if run.is_drawn { diagram(run, field) } else { Vec::new() };
         AtField::new(field, result.map(|spot| SpotJson { points, ..SpotJson::new(run, &spot) }))
     };
-    run.fields.iter().map(at).collect()
+    run.at_each_field(at)
 }
 
 /// Enters the milliseconds into all numbers of a spot, which come from the same rays.

@@ -88,7 +88,7 @@ pub(super) fn wavefronts(run: &AnalysisRun, asked: &[[f64; 2]]) -> Vec<AtField<W
         });
         AtField::new(field, keys)
     };
-    run.fields.iter().map(at).collect()
+    run.at_each_field(at)
 }
 
 /// The number of columns of the map of a drawing.
@@ -194,7 +194,7 @@ pub(super) fn path_fans(run: &AnalysisRun) -> Vec<AtField<PathFanJson>> {
         });
         AtField::new(field, keys)
     };
-    run.fields.iter().map(at).collect()
+    run.at_each_field(at)
 }
 
 impl TextLines for PathFanJson {
@@ -259,7 +259,7 @@ pub(super) fn zernikes(run: &AnalysisRun) -> Vec<AtField<ZernikeJson>> {
         });
         AtField::new(field, keys)
     };
-    run.fields.iter().map(at).collect()
+    run.at_each_field(at)
 }
 
 impl TextLines for ZernikeJson {

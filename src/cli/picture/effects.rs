@@ -102,12 +102,14 @@ impl PictureArgs {
             self.exposed.seconds.unwrap_or_else(|| model.normal_exposure(picture, luminance));
         let grey = MID_GREY * luminance * picture.white;
         let photons = photon_count(grey, picture.frame.pitch, seconds);
-        let noise = 1.0 / model.signal_to_noise(photons, model.dark_current * seconds);
+        let dark = model.dark_current * seconds;
+        let is_full = model.is_saturated(photons, dark);
+        let noise = 1.0 / model.signal_to_noise(photons, dark);
         let (_, ms) = time_ms(|| self.expose(sensor, source, picture));
         Some(PictureGate {
             effect: "noise",
             on: true,
-            number: Some(noise).filter(|noise| noise.is_finite()),
+            number: Some(noise).filter(|noise| noise.is_finite() && !is_full),
             unit: "share",
             limit: HIDDEN_NOISE,
             reason: "noise of electrons over their number at mid grey; a quarter of a step of 8 bits",

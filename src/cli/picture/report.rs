@@ -130,7 +130,7 @@ impl PictureReport {
         self.write_without_aberrations(f)
     }
 
-    /// Why the spread by diffraction is not that of the aberrated pupil, if it was tried.
+    /// The reason why the spread by diffraction is not that of the aberrated pupil, if it was tried.
     fn write_without_aberrations(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let refused = self.diffraction.as_ref().and_then(|found| found.without_aberrations);
         refused.map_or(Ok(()), |why| writeln!(f, "  aberrations are not in that spread: {why}"))

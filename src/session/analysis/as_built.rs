@@ -5,6 +5,7 @@
 
 use super::AnalysisSettings;
 use crate::lens::{Lens, ToleranceSheet};
+use crate::report::tolerance_warnings;
 use crate::tolerance::{
     ContrastChanges, ContrastSummary, ErrorModel, LoosestRequest, LoosestTolerances, MadeLens,
     NominalLens, RealMerit, RealMeritRequest, SecondDerivatives, StopTest, ToleranceAnalysis,
@@ -19,6 +20,8 @@ pub struct AsBuiltLens {
     pub sheet: ToleranceSheet,
     /// True if they are those of the lens file; false if a grade proposes them.
     pub from_lens: bool,
+    /// Warnings of tolerances that are seldom meant, and of what the quadratic form cannot tell.
+    pub warnings: Vec<String>,
     /// The share of each error in the growth of the expected mean square spot, at the fixed image plane
     /// and refocused.
     pub shares: Vec<[f64; 2]>,
@@ -152,6 +155,7 @@ fn as_built(
         unless_stopped(found.map(|(changes, real)| changes.summary(&sheet, real)))
     });
     Ok(AsBuiltLens {
+        warnings: tolerance_warnings((&sheet, lens.tolerances.is_none()), &scene.lens, &analysis),
         contrast,
         real_wavefront: real_wavefront.map(|real| real.root()),
         wavefront: waves.as_ref().map(|waves| root_variances(waves, &sheet)).transpose()?,

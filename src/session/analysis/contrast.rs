@@ -79,7 +79,7 @@ fn field_contrast(
     let wavefront = analysis::wavefront(model, field, model.primary, accuracy);
     match polychromatic_diffraction_mtf_unless(model, field, frequencies, accuracy, interrupted) {
         Ok(curve) => Ok(FieldContrast { curve, without_diffraction: None, wavefront }),
-        Err(why @ (AnalysisError::FoldedPupil | AnalysisError::IrregularPupil)) => {
+        Err(why) if why.is_of_diffraction() => {
             let curve = polychromatic_geometric_mtf(model, field, frequencies, accuracy)?;
             Ok(FieldContrast { curve, without_diffraction: Some(why), wavefront })
         }

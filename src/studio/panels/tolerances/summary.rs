@@ -3,7 +3,6 @@
 use egui::{Grid, RichText, Ui};
 
 use crate::lens::Lens;
-use crate::report::tolerance_warnings;
 use crate::session::{AsBuiltLens, Command};
 use crate::studio::actions::Actions;
 use crate::studio::number;
@@ -33,8 +32,7 @@ pub(super) fn facts(ui: &mut Ui, made: &AsBuiltLens, ms: f64) {
         let text = format!("{lost} of {samples} real lenses lose rays and count as bad");
         ui.label(RichText::new(text).small().color(ui.visuals().warn_fg_color));
     }
-    let of_a_class = !made.from_lens;
-    for text in tolerance_warnings((&made.sheet, of_a_class), &made.nominal, &made.analysis) {
+    for text in &made.warnings {
         ui.label(RichText::new(text).small().color(ui.visuals().warn_fg_color));
     }
     let apart = made.analysis.spots.iter().any(|spot| samples > 0 && !spot.form_agrees);
