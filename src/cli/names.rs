@@ -121,8 +121,12 @@ impl ValueEnum for SearchContender {
     fn to_possible_value(&self) -> Option<PossibleValue> {
         match self {
             Self::Sampler(method) => method.to_possible_value(),
-            Self::BasinHopping => {
-                Some(value("basin-hopping", "As `iterated`, with one mutant at a time"))
+            Self::BasinHopping => Some(value(
+                "basin-hopping",
+                "All variables displaced at random, the structure kept",
+            )),
+            Self::SingleTrial => {
+                Some(value("single-trial", "As `iterated`, with one mutant at a time"))
             }
             Self::Descent => Some(value("descent", "From the start without mutations")),
         }

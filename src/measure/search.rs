@@ -8,7 +8,7 @@ use super::timing::Stopwatch;
 use crate::lens::Lens;
 use crate::merit::MeritError;
 use crate::search::lens_landscape::{LensLandscape, SearchPlan, SearchSetupError};
-use crate::search::{SearchMethod, SearchRunOn, SearchSettings};
+use crate::search::{SearchMethod, SearchRunOn};
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -46,9 +46,11 @@ pub struct SearchBudget {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SearchContender {
-    /// An iterated local search with one trial at a time, which does not race: basin hopping (Wales,
-    /// Doye, J. Phys. Chem. A 101, 1997) that accepts improvements alone.
+    /// Basin hopping (Wales, Doye, J. Phys. Chem. A 101, 5111, 1997) that accepts improvements alone: all
+    /// variables are displaced at random, and a descent follows. The structure stays.
     BasinHopping,
+    /// An iterated local search with one mutant at a time, which does not race.
+    SingleTrial,
     /// A descent from the start without mutations, the same for every seed.
     Descent,
     /// A search by a sampler.
@@ -58,23 +60,26 @@ pub enum SearchContender {
 
 impl SearchContender {
     /// All contenders.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Sampler(SearchMethod::IteratedLocalSearch),
         Self::Descent,
         Self::BasinHopping,
+        Self::SingleTrial,
         Self::Sampler(SearchMethod::BruteForce),
         Self::Sampler(SearchMethod::Metropolis),
         Self::Sampler(SearchMethod::Restore),
     ];
 
-    fn settings(self, usual: &SearchSettings) -> SearchSettings {
+    /// Makes the usual plan one of this contender.
+    fn apply_to(self, plan: &mut SearchPlan) {
         match self {
-            Self::Sampler(method) => SearchSettings { method, ..usual.clone() },
-            Self::BasinHopping => {
-                let method = SearchMethod::IteratedLocalSearch;
-                SearchSettings { method, trials: 1, ..usual.clone() }
+            Self::Sampler(method) => plan.settings.method = method,
+            Self::BasinHopping | Self::SingleTrial => {
+                plan.settings.method = SearchMethod::IteratedLocalSearch;
+                plan.settings.trials = 1;
+                plan.rules.displacements = self == Self::BasinHopping;
             }
-            Self::Descent => usual.without_mutations(),
+            Self::Descent => plan.settings = plan.settings.without_mutations(),
         }
     }
 }
@@ -161,8 +166,8 @@ pub fn compare_searches(
     let row = |method: SearchContender, tolerance, gradients| {
         let mut plan = plan.clone();
         (plan.local.tolerance, plan.local.coarse) = (tolerance, tolerance);
-        let usual = SearchSettings { gradients, moves: None, ..plan.settings };
-        plan.settings = method.settings(&usual);
+        (plan.settings.gradients, plan.settings.moves) = (gradients, None);
+        method.apply_to(&mut plan);
         run_seeds(lens, &plan, method, race, stop)
     };
     let usual = plan.local.tolerance;

@@ -50,6 +50,9 @@ pub struct SearchRules {
     /// True to add elements at saddle points of the merit.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub saddles: bool,
+    /// True for an iterated local search that displaces all variables at random in place of mutations.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub displacements: bool,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "the form that serde asks for")]
@@ -75,6 +78,7 @@ impl Default for SearchRules {
             back_focus: None,
             aspheres: 0,
             saddles: false,
+            displacements: false,
         }
     }
 }

@@ -89,6 +89,7 @@ fn name(contender: SearchContender) -> &'static str {
         SearchContender::Sampler(SearchMethod::Metropolis) => "Metropolis-Hastings",
         SearchContender::Sampler(SearchMethod::BruteForce) => "brute force",
         SearchContender::BasinHopping => "basin hopping",
+        SearchContender::SingleTrial => "one mutant at a time",
         SearchContender::Descent => "descent alone",
     }
 }

@@ -8,7 +8,7 @@ use crate::search::LossGradient;
 
 /// The unit of a parameter for a lens of a size in mm; units of all parameters deflect rays by
 /// similar amounts.
-fn langevin_unit(lens: &Lens, parameter: Parameter, size: f64) -> f64 {
+pub(super) fn langevin_unit(lens: &Lens, parameter: Parameter, size: f64) -> f64 {
     match parameter.quantity {
         Quantity::Curvature => 0.5 / size,
         Quantity::Thickness | Quantity::SemiDiameter => 0.02 * size,

@@ -8,6 +8,7 @@
 
 mod aspheres;
 mod descent_settings;
+mod displacement;
 mod finalize;
 mod langevin_units;
 mod minimum;
@@ -386,6 +387,9 @@ impl Landscape for LensLandscape {
         weights: &MutationWeights,
         random: &mut Random,
     ) -> Result<MutatedPoint<Arc<Lens>>, MutationError> {
+        if self.rules.displacements {
+            return self.displaced(lens, random);
+        }
         let rules = self.weighted_rules(weights);
         let usual = |kind, lens: &Lens, rules: &SearchRules, random: &mut Random| {
             mutation::perturb_as(kind, lens, rules, random)

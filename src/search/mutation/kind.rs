@@ -29,6 +29,8 @@ pub enum MutationKind {
     AddAsphere,
     /// Makes an aspheric surface spherical.
     RemoveAsphere,
+    /// Displaces all variables at random.
+    Displacement,
     /// Draws a random lens.
     Global,
 }
@@ -68,6 +70,7 @@ impl MutationKind {
             Self::MoveStop => "move stop",
             Self::AddAsphere => "add asphere",
             Self::RemoveAsphere => "remove asphere",
+            Self::Displacement => "displacement",
             Self::Global => "global draw",
         }
     }

@@ -91,6 +91,11 @@ pub enum StructureChange {
         /// The surface.
         surface: SurfaceNumber,
     },
+    /// Displaced all variables by normal deviates.
+    Displacement {
+        /// The standard deviation, in units that deflect rays by similar amounts.
+        size: f64,
+    },
     /// A change of another landscape, or one that an earlier version recorded as text.
     Text(String),
 }
@@ -131,6 +136,9 @@ impl Display for StructureChange {
                 write!(f, "made the {parameter} variable")
             }
             Self::RemoveAsphere { surface } => write!(f, "made surface {surface} spherical"),
+            Self::Displacement { size } => {
+                write!(f, "displaced all variables by {size:.3} units")
+            }
             Self::Text(text) => f.write_str(text),
         }
     }
