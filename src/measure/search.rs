@@ -8,7 +8,7 @@ use super::timing::Stopwatch;
 use crate::lens::Lens;
 use crate::merit::MeritError;
 use crate::search::lens_landscape::{LensLandscape, SearchPlan, SearchSetupError};
-use crate::search::{SearchMethod, SearchRunOn};
+use crate::search::{MutationKind, SearchMethod, SearchRunOn};
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -77,7 +77,11 @@ impl SearchContender {
             Self::BasinHopping | Self::SingleTrial => {
                 plan.settings.method = SearchMethod::IteratedLocalSearch;
                 plan.settings.trials = 1;
-                plan.rules.displacements = self == Self::BasinHopping;
+                if self == Self::BasinHopping {
+                    let weight = |kind| f64::from(u8::from(kind == MutationKind::Displacement));
+                    plan.rules.weights =
+                        MutationKind::PERTURBATIONS.map(|kind| (kind, weight(kind))).to_vec();
+                }
             }
             Self::Descent => plan.settings = plan.settings.without_mutations(),
         }

@@ -50,9 +50,6 @@ pub struct SearchRules {
     /// True to add elements at saddle points of the merit.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub saddles: bool,
-    /// True for an iterated local search that displaces all variables at random in place of mutations.
-    #[serde(skip_serializing_if = "std::ops::Not::not")]
-    pub displacements: bool,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "the form that serde asks for")]
@@ -78,7 +75,6 @@ impl Default for SearchRules {
             back_focus: None,
             aspheres: 0,
             saddles: false,
-            displacements: false,
         }
     }
 }
@@ -130,13 +126,14 @@ impl SearchRules {
     }
 
     /// The relative frequency of a kind of mutation; 0 for those about aspheric surfaces where none is
-    /// permitted.
+    /// permitted, and for displacements unless they are listed.
     pub fn weight(&self, kind: MutationKind) -> f64 {
         if kind.is_about_aspheres() && self.aspheres == 0 {
             return 0.0;
         }
         let listed = self.weights.iter().find(|(listed, _)| *listed == kind);
-        listed.map_or(1.0, |(_, weight)| *weight)
+        let usual = if kind == MutationKind::Displacement { 0.0 } else { 1.0 };
+        listed.map_or(usual, |(_, weight)| *weight)
     }
 
     /// The same rules restricted to mutations of the surfaces `first` to `last` of a lens with

@@ -28,7 +28,7 @@ fn a_search_killed_twenty_times_ends_with_the_same_result() {
 
 fn kill_search(method: &str) {
     const TRIPLET: &str = "lenses/cooke_triplet_100_f27.json";
-    let options = ["--seed", "3", "--chains", "2", "--iterations", "1000"];
+    let options = ["--seed", "3", "--chains", "2", "--iterations", "600"];
     let base = [&["search", TRIPLET, "--method", method][..], &options].concat();
     let whole = done_json(&base, "");
     let checkpoint = Scratch::new(&format!("killed-{method}.json"));

@@ -167,7 +167,7 @@ impl FromStr for MutationArg {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let name = |kind: MutationKind| kind.name().replace(' ', "_");
-        let all = MutationKind::MUTATIONS.into_iter().chain([MutationKind::Global]);
+        let all = MutationKind::PERTURBATIONS.into_iter().chain([MutationKind::Global]);
         let found = all.clone().find(|kind| name(*kind) == text.replace('-', "_"));
         let known: Vec<String> = all.map(name).collect();
         found.map(Self).ok_or_else(|| format!("expected one of {}", known.join(", ")))

@@ -11,10 +11,11 @@ use super::judge::is_aspheric;
 use super::rims::with_rims;
 use super::starts::{NamedDraft, achromats, draft_of, library_starts, random_starts};
 use super::thin_triplet::triplets;
-use crate::lens::{Aperture, Lens, Parameter, Quantity, Variable};
+use crate::lens::{Aperture, Lens, Medium, Parameter, Quantity, Variable};
 use crate::search::element::piece_count;
+use crate::search::mutation::perturb_as;
 use crate::search::predicted_gain::drawn_by_weight;
-use crate::search::{MutationKind, Random, SearchRules, propose};
+use crate::search::{MutatedLens, MutationKind, Random, SearchRules, perturb};
 use rand::{RngExt as _, SeedableRng as _};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -95,6 +96,12 @@ const MUTANTS: usize = 12;
 const CHOSEN: usize = 4;
 const MUTANT_TRIALS: usize = 36;
 const CHOSEN_TRIALS: usize = 120;
+/// The number of candidates of one structure that stay: descendants of one lens would fill the pool
+/// before others have had their descents.
+const ALIKE: usize = 2;
+/// The share of mutants that are mutated once more: of those that have lost an element, which get one
+/// at another place, and of the others.
+const TWICE: [f64; 2] = [0.7, 0.2];
 /// The share of mutants with an aspheric figure on another surface, the least gain that one promises, and
 /// the conic constant and coefficient that mark it.
 const FIGURED: f64 = 0.25;
@@ -318,11 +325,34 @@ impl DesignRun {
         }
         alive.sort_by(|a, b| a.value.total_cmp(&b.value));
         alive.truncate(CHOSEN);
-        alive.extend(self.pool.iter().take(2).cloned());
+        // The best candidate, and one of the others, go on as well.
+        let mut random = self.random(0);
+        if self.pool.len() > 1 {
+            let other = random.random_range(1..self.pool.len());
+            alive.push(self.pool.remove(other));
+        }
+        alive.extend((!self.pool.is_empty()).then(|| self.pool.remove(0)));
         let found = self.improve(&alive, CHOSEN_TRIALS, true, stop);
-        let olds = self.pool.len().min(2);
-        self.pool.drain(..olds);
         self.take(found);
+        self.keep_structures_apart();
+    }
+
+    /// Keeps the best candidates, of one structure only a few.
+    fn keep_structures_apart(&mut self) {
+        let mut kept: Vec<(String, usize)> = Vec::new();
+        self.pool.retain(|candidate| {
+            let structure = structure(&candidate.draft.lens);
+            match kept.iter_mut().find(|(known, _)| *known == structure) {
+                Some((_, count)) => {
+                    *count += 1;
+                    *count <= ALIKE
+                }
+                None => {
+                    kept.push((structure, 1));
+                    true
+                }
+            }
+        });
         self.pool.truncate(POOL);
     }
 
@@ -346,9 +376,14 @@ impl DesignRun {
         lens.aperture = Aperture::EntrancePupilDiameter(2.0 * self.asked.beam_radius());
         lens.variables = variables(&lens);
         for _ in 0..4 {
-            let Ok(mutant) = propose(&lens, &rules, random) else { continue };
-            let Some(draft) = draft_of(&mutant.lens, &self.asked) else { continue };
-            let origin = format!("{}, {}", parent.origin, mutant.kind.name());
+            let Ok(mutant) = perturb(&lens, &rules, random) else { continue };
+            let mut origin = format!("{}, {}", parent.origin, mutant.kind.name());
+            let mut mutated = mutant.lens;
+            if let Some(second) = second_mutation(&lens, &mutated, &rules, random) {
+                origin = format!("{origin}, {}", second.kind.name());
+                mutated = second.lens;
+            }
+            let Some(draft) = draft_of(&mutated, &self.asked) else { continue };
             return Some(Candidate { origin, draft, value: f64::INFINITY });
         }
         None
@@ -456,6 +491,37 @@ impl DesignRun {
         }
         self.pool.sort_by(|a, b| a.value.total_cmp(&b.value));
     }
+}
+
+/// Another mutation of a mutant, if it is to have one and it applies: one that has fewer elements than its
+/// parent gets an element, since a smaller lens is seldom better.
+fn second_mutation(
+    parent: &Lens,
+    mutant: &Lens,
+    rules: &SearchRules,
+    random: &mut Random,
+) -> Option<MutatedLens> {
+    let is_smaller = piece_count(mutant) < piece_count(parent);
+    let share = if is_smaller { TWICE[0] } else { TWICE[1] };
+    if random.random::<f64>() >= share {
+        return None;
+    }
+    let mutated = if is_smaller {
+        perturb_as(MutationKind::AddSinglet, mutant, rules, random)
+    } else {
+        perturb(mutant, rules, random)
+    };
+    mutated.ok()
+}
+
+/// The pattern of glass and air with the signs of the powers of all pieces in air.
+fn structure(lens: &Lens) -> String {
+    let pieces = lens.surfaces.windows(2).map(|pair| match pair[0].medium {
+        Medium::Air => '|',
+        _ if pair[0].curvature > pair[1].curvature => '+',
+        _ => '-',
+    });
+    pieces.collect()
 }
 
 /// All curvatures and gaps as variables.

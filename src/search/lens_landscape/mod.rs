@@ -32,8 +32,8 @@ pub use summary::{FieldSummary, LensSummary};
 pub use violations::describe_violation;
 
 use super::{
-    Landscape, LossGradient, MutatedLens, MutatedPoint, MutationError, MutationKind,
-    MutationWeights, Random, Refusal, RuleError, SearchRules, Settlement, element, mutation,
+    Landscape, LossGradient, MutatedPoint, MutationError, MutationKind, MutationWeights, Random,
+    Refusal, RuleError, SearchRules, Settlement, element, mutation,
 };
 use crate::lens::{Lens, LensError, Parameter, Quantity};
 use crate::merit::{Goal, Merit, MeritError};
@@ -274,8 +274,8 @@ impl LensLandscape {
 
     /// The rules with the relative frequencies of mutations multiplied by weights.
     fn weighted_rules(&self, weights: &MutationWeights) -> SearchRules {
-        let own =
-            MutationKind::MUTATIONS.map(|kind| (kind, self.rules.weight(kind) * weights.of(kind)));
+        let own = MutationKind::PERTURBATIONS
+            .map(|kind| (kind, self.rules.weight(kind) * weights.of(kind)));
         SearchRules { weights: own.to_vec(), ..self.rules.clone() }
     }
 
@@ -283,21 +283,6 @@ impl LensLandscape {
     fn evaluate(&self, lens: &Lens) -> Result<f64, MeritError> {
         let merit = self.merit(lens, self.local.tolerance)?;
         Ok(self.priced(lens, merit.value(&merit.values(lens))?))
-    }
-
-    /// A mutation of a kind drawn by the weights of these rules, as `usual` makes it unless the landscape
-    /// chooses its place by derivatives.
-    fn mutated(
-        &self,
-        lens: &Arc<Lens>,
-        rules: &SearchRules,
-        random: &mut Random,
-        usual: UsualMutation,
-    ) -> Result<MutatedPoint<Arc<Lens>>, MutationError> {
-        match mutation::draw_kind(rules, random)? {
-            MutationKind::AddAsphere => self.add_asphere(lens, rules, random),
-            kind => usual(kind, lens, rules, random).map(Into::into),
-        }
     }
 
     /// A local move of at most `most` steps: the new lens, its loss, and the number of gradients.
@@ -335,10 +320,6 @@ impl LensLandscape {
 
 /// The relative increase of the loss that a move may make, since the rays of two lenses differ.
 const SLACK: f64 = 0.05;
-
-/// A mutation of a kind.
-type UsualMutation =
-    fn(MutationKind, &Lens, &SearchRules, &mut Random) -> Result<MutatedLens, MutationError>;
 
 /// The maximum number of random lenses that are tried.
 const MAX_DRAWS: usize = 200;
@@ -378,7 +359,11 @@ impl Landscape for LensLandscape {
         weights: &MutationWeights,
         random: &mut Random,
     ) -> Result<MutatedPoint<Arc<Lens>>, MutationError> {
-        self.mutated(lens, &self.weighted_rules(weights), random, mutation::mutate)
+        let rules = self.weighted_rules(weights);
+        match mutation::draw_kind(&MutationKind::MUTATIONS, &rules, random)? {
+            MutationKind::AddAsphere => self.add_asphere(lens, &rules, random),
+            kind => mutation::mutate(kind, lens, &rules, random).map(Into::into),
+        }
     }
 
     fn perturb(
@@ -387,20 +372,12 @@ impl Landscape for LensLandscape {
         weights: &MutationWeights,
         random: &mut Random,
     ) -> Result<MutatedPoint<Arc<Lens>>, MutationError> {
-        if self.rules.displacements {
-            return self.displaced(lens, random);
-        }
         let rules = self.weighted_rules(weights);
-        let usual = |kind, lens: &Lens, rules: &SearchRules, random: &mut Random| {
-            mutation::perturb_as(kind, lens, rules, random)
-        };
-        if !rules.saddles {
-            return self.mutated(lens, &rules, random, usual);
-        }
-        match mutation::draw_kind(&rules, random)? {
+        match mutation::draw_kind(&MutationKind::PERTURBATIONS, &rules, random)? {
             MutationKind::AddAsphere => self.add_asphere(lens, &rules, random),
-            MutationKind::AddSinglet => self.add_at_saddle(lens, &rules, random),
-            kind => usual(kind, lens, &rules, random).map(Into::into),
+            MutationKind::AddSinglet if rules.saddles => self.add_at_saddle(lens, &rules, random),
+            MutationKind::Displacement => self.displaced(lens, random),
+            kind => mutation::perturb_as(kind, lens, &rules, random).map(Into::into),
         }
     }
 

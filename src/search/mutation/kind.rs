@@ -29,7 +29,7 @@ pub enum MutationKind {
     AddAsphere,
     /// Makes an aspheric surface spherical.
     RemoveAsphere,
-    /// Displaces all variables at random.
+    /// Displaces all variables at random: a perturbation of an iterated local search, if it has a weight.
     Displacement,
     /// Draws a random lens.
     Global,
@@ -49,6 +49,22 @@ impl MutationKind {
         Self::MoveStop,
         Self::AddAsphere,
         Self::RemoveAsphere,
+    ];
+
+    /// All kinds by which an iterated local search perturbs a lens.
+    pub const PERTURBATIONS: [Self; 12] = [
+        Self::AddSinglet,
+        Self::RemoveSinglet,
+        Self::Glue,
+        Self::Split,
+        Self::DropLayer,
+        Self::Bend,
+        Self::Flip,
+        Self::ExchangeGlass,
+        Self::MoveStop,
+        Self::AddAsphere,
+        Self::RemoveAsphere,
+        Self::Displacement,
     ];
 
     /// True for the kinds that change which surfaces are aspheric.

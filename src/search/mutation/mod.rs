@@ -87,7 +87,7 @@ pub fn propose(
     rules: &SearchRules,
     random: &mut Random,
 ) -> Result<MutatedLens, MutationError> {
-    mutate(draw_kind(rules, random)?, lens, rules, random)
+    mutate(draw_kind(&MutationKind::MUTATIONS, rules, random)?, lens, rules, random)
 }
 
 /// As [`propose`], for a search that takes the better lens and needs no way back: glasses are drawn
@@ -101,7 +101,7 @@ pub fn perturb(
     rules: &SearchRules,
     random: &mut Random,
 ) -> Result<MutatedLens, MutationError> {
-    perturb_as(draw_kind(rules, random)?, lens, rules, random)
+    perturb_as(draw_kind(&MutationKind::MUTATIONS, rules, random)?, lens, rules, random)
 }
 
 /// As [`perturb`], by a mutation of this kind.
@@ -123,15 +123,16 @@ pub(super) fn perturb_as(
     Ok(MutatedLens { log_ratio: None, ..mutated })
 }
 
-/// Draws a kind by the weights of the rules.
+/// Draws one of these kinds by the weights of the rules.
 pub(super) fn draw_kind(
+    kinds: &[MutationKind],
     rules: &SearchRules,
     random: &mut Random,
 ) -> Result<MutationKind, MutationError> {
     let weight = |kind: &MutationKind| rules.weight(*kind).max(0.0);
-    let sum: f64 = MutationKind::MUTATIONS.iter().map(weight).sum();
+    let sum: f64 = kinds.iter().map(weight).sum();
     let mut left = random.random::<f64>() * sum;
-    let drawn = MutationKind::MUTATIONS.into_iter().find(|kind| {
+    let drawn = kinds.iter().copied().find(|kind| {
         left -= weight(kind);
         left < 0.0
     });

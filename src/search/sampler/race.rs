@@ -211,9 +211,9 @@ impl Race {
     pub(super) fn weights(&self, user: &MutationWeights) -> MutationWeights {
         let expected = GainRate::expected(KIND_EXPECTATION_GRADIENTS);
         let rate = |kind| self.kinds.get(&kind).copied().unwrap_or(expected).value();
-        let largest = MutationKind::MUTATIONS.into_iter().map(rate).fold(0.0, f64::max);
+        let largest = MutationKind::PERTURBATIONS.into_iter().map(rate).fold(0.0, f64::max);
         let mut weights = user.clone();
-        for kind in MutationKind::MUTATIONS {
+        for kind in MutationKind::PERTURBATIONS {
             let share = (rate(kind) / largest).max(LEAST_SHARE);
             weights.set(kind, share * user.of(kind));
         }

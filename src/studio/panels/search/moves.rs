@@ -93,7 +93,7 @@ fn refusal_summary(ui: &mut Ui, run: &StructureSearchSnapshot) {
 
 /// Every kind, in the order in which they are shown.
 pub(super) fn kinds() -> impl Iterator<Item = MutationKind> {
-    MutationKind::MUTATIONS.into_iter().chain([MutationKind::Global])
+    MutationKind::PERTURBATIONS.into_iter().chain([MutationKind::Global])
 }
 
 /// The place of a kind among all.
