@@ -202,7 +202,7 @@ fn descend(
             return (DescentEnd::Lost, used);
         };
         if found.is_minimum() {
-            if start % CHECKED == 0 {
+            if start.is_multiple_of(CHECKED) {
                 let (moved, evaluations) = found.moves_on(landscape, &halted, tolerance);
                 found.moved = moved;
                 used += evaluations;

@@ -70,7 +70,8 @@ pub(in crate::cli) struct SearchPlanArgs {
     no_projection: bool,
 
     /// Kinds of mutations to exclude: `add_singlet`, `remove_singlet`, `glue`, `split`, `drop_layer`,
-    /// `bend`, `flip`, `exchange_glass`, `move_stop`, `add_asphere`, `remove_asphere`, `global_draw`
+    /// `bend`, `flip`, `exchange_glass`, `move_stop`, `add_asphere`, `remove_asphere`, `displacement`,
+    /// `global_draw`
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
     forbid: Vec<MutationArg>,
 

@@ -1,6 +1,6 @@
 //! The way to limits that cannot be kept near where a descent has come to: it begins anew at the first lens,
-//! with the limits as penalties whose weight grows, so that it may pass through lenses that break them
-//! (Fiacco, McCormick, *Nonlinear Programming: Sequential Unconstrained Minimization Techniques*, 1968).
+//! with the limits as penalties whose weight grows, so that it may pass through lenses that break them: the
+//! sequential unconstrained minimization of Fiacco and others (*Nonlinear Programming*, 1968).
 
 use super::LimitedOptimizer;
 use crate::solve::{LeastSquaresPoint, LimitedPoint, LimitedTrustRegion, TrustRegion};
@@ -63,14 +63,14 @@ impl LimitedOptimizer {
     }
 
     /// Tries one step with penalties; returns the part of it that was taken, 0 or 1.
-    pub(super) fn lead_in_step(&mut self, mut lead_in: LeadIn) -> f64 {
+    pub(super) fn try_lead_in_step(&mut self, mut lead_in: LeadIn) -> f64 {
         let room = self.state.room();
         let point = lead_in.penalized(&self.point);
         let step = lead_in.region.propose(&point, &room);
         let is_small = |promised: f64| promised <= SMALL_GAIN * point.value;
         let is_idle = is_small(lead_in.region.attainable_decrease(&point, &room));
         let Some(step) = step.filter(|_| !is_idle && lead_in.trials < TRIALS) else {
-            self.end_stage(lead_in);
+            self.end_stage(lead_in.weight);
             return 0.0;
         };
         lead_in.trials += 1;
@@ -90,15 +90,48 @@ impl LimitedOptimizer {
     }
 
     /// Goes on with a larger weight, or with the limits as constraints.
-    fn end_stage(&mut self, lead_in: LeadIn) {
+    fn end_stage(&mut self, weight: f64) {
         let count = self.state.values.len();
         let is_near = self.point.limits.violation() <= NEAR;
-        let weight = GROWTH * lead_in.weight;
+        let weight = GROWTH * weight;
         if is_near || weight > LARGEST_WEIGHT {
             self.method = LimitedTrustRegion::new(count, self.limits.len());
             self.first_gradient = None;
         } else {
             self.lead_in = Some(LeadIn { weight, ..LeadIn::new(count) });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solve::LimitValues;
+    use nalgebra::{DMatrix, DVector};
+
+    /// Two variables, of which the first one is 0.5 above its bound and the second one within it.
+    fn point() -> LimitedPoint {
+        LimitedPoint {
+            objective: LeastSquaresPoint {
+                value: 3.0,
+                half_gradient: DVector::from_column_slice(&[1.0, -2.0]),
+                normal: DMatrix::identity(2, 2),
+            },
+            limits: LimitValues {
+                values: DVector::from_column_slice(&[1.5, 0.3]),
+                slopes: DMatrix::identity(2, 2),
+                bounds: vec![[0.0, 1.0]; 2],
+                weights: vec![2.0, 5.0],
+            },
+        }
+    }
+
+    #[test]
+    fn broken_limits_alone_are_penalized_by_their_weights() {
+        let stage = LeadIn { weight: 10.0, ..LeadIn::new(2) };
+        let sum = stage.penalized(&point());
+        assert!((sum.value - (3.0 + 20.0 * 0.25)).abs() < 1e-12, "{}", sum.value);
+        assert_eq!(sum.half_gradient.as_slice(), [1.0 + 20.0 * 0.5, -2.0]);
+        assert_eq!(sum.normal.as_slice(), [21.0, 0.0, 0.0, 1.0]);
     }
 }

@@ -393,7 +393,7 @@ impl Optimizer for LimitedOptimizer {
             return self.state.progress(0.0, self.end);
         }
         let tried = match self.lead_in.take() {
-            Some(lead_in) => Ok(self.lead_in_step(lead_in)),
+            Some(lead_in) => Ok(self.try_lead_in_step(lead_in)),
             None => self.try_step(),
         };
         if let Err(end) = tried {

@@ -19,6 +19,7 @@ use crate::search::{MutatedLens, MutationKind, Random, SearchRules, perturb};
 use rand::{RngExt as _, SeedableRng as _};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The settings of a design besides its requirements.
@@ -339,19 +340,11 @@ impl DesignRun {
 
     /// Keeps the best candidates, of one structure only a few.
     fn keep_structures_apart(&mut self) {
-        let mut kept: Vec<(String, usize)> = Vec::new();
+        let mut kept: BTreeMap<String, usize> = BTreeMap::new();
         self.pool.retain(|candidate| {
-            let structure = structure(&candidate.draft.lens);
-            match kept.iter_mut().find(|(known, _)| *known == structure) {
-                Some((_, count)) => {
-                    *count += 1;
-                    *count <= ALIKE
-                }
-                None => {
-                    kept.push((structure, 1));
-                    true
-                }
-            }
+            let count = kept.entry(structure(&candidate.draft.lens)).or_insert(0);
+            *count += 1;
+            *count <= ALIKE
         });
         self.pool.truncate(POOL);
     }
@@ -552,6 +545,7 @@ impl Candidate {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lens::{Row, blank};
     use crate::search::design::LensSpecification;
 
     fn with_pool(stage: DesignStage) -> DesignRun {
@@ -586,6 +580,37 @@ mod tests {
         assert!(run.advance(0.5, &stop) && run.stage() == DesignStage::Glasses);
         assert!(run.pool.iter().all(|c| in_catalogue(&c.draft.lens, &run.asked)));
         assert!(!run.advance(0.95, &stop));
+    }
+
+    /// Of the descendants of one lens few stay, so that there is room for other structures.
+    #[test]
+    fn few_candidates_of_one_structure_stay() {
+        let mut run = with_pool(DesignStage::Mutations);
+        let parent = run.pool[0].clone();
+        let valued = |value: f64| Candidate { value, ..parent.clone() };
+        run.pool = (1..=5).map(|value| valued(f64::from(value))).collect();
+        // A doublet with the signs of its powers exchanged.
+        let mut other = valued(6.0);
+        other.draft.lens.surfaces.iter_mut().for_each(|row| row.curvature *= -1.0);
+        assert_ne!(structure(&other.draft.lens), structure(&parent.draft.lens));
+        run.pool.push(other);
+        run.keep_structures_apart();
+        let values: Vec<f64> = run.pool.iter().map(|candidate| candidate.value).collect();
+        assert_eq!(values, [1.0, 2.0, 6.0]);
+    }
+
+    #[test]
+    fn a_structure_tells_glass_from_air_and_the_signs_of_powers() {
+        let surfaces = |rows: &[(f64, bool)]| {
+            let row = |(curvature, is_glass): &(f64, bool)| Row {
+                curvature: *curvature,
+                medium: if *is_glass { Medium::Model { nd: 1.5, vd: 60.0 } } else { Medium::Air },
+                ..Row::default()
+            };
+            Lens { surfaces: rows.iter().map(row).collect(), ..blank() }
+        };
+        let rows = [(0.02, true), (-0.01, true), (0.01, false), (-0.03, true), (0.0, false)];
+        assert_eq!(structure(&surfaces(&rows)), "+-|-");
     }
 
     /// A piece costs 1, an aspheric surface half of that.

@@ -39,3 +39,59 @@ impl LensLandscape {
         Ok(MutatedPoint { point, kind, record, log_ratio: None, gradients: 0 })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::Parameter;
+    use crate::search::Refusal;
+    use crate::search::lens_landscape::SearchPlan;
+    use crate::search::{Landscape as _, MutationWeights};
+    use rand::SeedableRng as _;
+
+    /// The landscape of the Tessar in which lenses are displaced and nothing else.
+    fn landscape() -> LensLandscape {
+        let found =
+            crate::files::bundled_lenses().iter().find(|b| b.name == "tessar_50_f28").unwrap();
+        let lens = crate::files::json::read(found.text, found.name).unwrap();
+        let mut plan = SearchPlan::default();
+        let weight = |kind| f64::from(u8::from(kind == MutationKind::Displacement));
+        plan.rules.weights = MutationKind::PERTURBATIONS.map(|kind| (kind, weight(kind))).to_vec();
+        plan.landscape(&lens).unwrap()
+    }
+
+    #[test]
+    fn a_displacement_changes_every_variable_within_its_bounds_and_nothing_else() {
+        let landscape = landscape();
+        let start = landscape.with_variables(landscape.start());
+        for seed in 0..20 {
+            let mut random = Random::seed_from_u64(seed);
+            let weights = MutationWeights::default();
+            let found = landscape.perturb(landscape.start(), &weights, &mut random).unwrap();
+            assert_eq!(found.kind, MutationKind::Displacement);
+            assert_eq!(landscape.topology(&found.point), landscape.topology(landscape.start()));
+            let value = |lens: &Lens, parameter: Parameter| lens.get(parameter).unwrap();
+            for variable in &start.variables {
+                let [before, after] =
+                    [&start, &*found.point].map(|lens| value(lens, variable.parameter));
+                let inside = variable.min.is_none_or(|min| after >= min)
+                    && variable.max.is_none_or(|max| after <= max);
+                let held = variable.min.is_some() && variable.min == variable.max;
+                let at_bound = Some(after) == variable.min || Some(after) == variable.max;
+                assert!(inside && (held || at_bound || after != before), "{variable:?} {after}");
+            }
+            let fixed = start.surfaces.iter().zip(&found.point.surfaces);
+            assert!(fixed.into_iter().all(|(a, b)| a.medium == b.medium && a.stop == b.stop));
+        }
+    }
+
+    /// A displacement is no mutation of RESTORE, and of an iterated search only if it is listed.
+    #[test]
+    fn displacements_are_drawn_where_they_are_asked_for() {
+        let (rules, listed) = (SearchPlan::default().rules, landscape());
+        assert_eq!(rules.weight(MutationKind::Displacement), 0.0);
+        let weights = MutationWeights::default();
+        let drawn = listed.mutate(listed.start(), &weights, &mut Random::seed_from_u64(1));
+        assert_eq!(drawn.unwrap_err().refusal, Refusal::AllExcluded);
+    }
+}
