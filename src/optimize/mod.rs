@@ -173,7 +173,7 @@ pub fn start_from(
             Box::new(least_squares::LeastSquaresOptimizer::new(merit, lens)?)
         }
         DescentMethod::TrustRegion if merit.has_limits() => {
-            Box::new(limited::LimitedOptimizer::new(merit, lens, tolerance)?.leading_in())
+            Box::new(limited::LimitedOptimizer::new(merit, lens, tolerance)?)
         }
         DescentMethod::TrustRegion => {
             Box::new(trust_region::TrustRegionOptimizer::new(merit, lens, tolerance)?)

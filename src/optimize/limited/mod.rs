@@ -6,14 +6,12 @@
 //! or is stopped, all of them are restored to [`KEPT`] with the rays of the lens itself.
 
 mod conflict;
-mod lead_in;
 mod price;
 mod settlement;
 mod springs;
 
 pub(super) use springs::add_springs;
 
-use self::lead_in::LeadIn;
 use super::state::OptimizerState;
 use super::{LimitPrice, OptimizationEnd, OptimizationProgress, Optimizer};
 use crate::lens::Lens;
@@ -66,12 +64,6 @@ pub(super) struct LimitedOptimizer {
     restarts: usize,
     end: Option<OptimizationEnd>,
     conflict: Vec<String>,
-    /// The values at the start.
-    first: Vec<f64>,
-    /// True if the descent begins anew at the start where limits cannot be kept.
-    may_lead_in: bool,
-    /// The descent with penalties from there.
-    lead_in: Option<LeadIn>,
 }
 
 impl LimitedOptimizer {
@@ -81,11 +73,8 @@ impl LimitedOptimizer {
         let mut this = Self {
             method: LimitedTrustRegion::new(state.values.len(), found.limits.len()),
             point: scaled_point(&state, &found.objective, &found.limits),
-            first: state.values.clone(),
             state,
             limits: found.limits,
-            may_lead_in: false,
-            lead_in: None,
             first_gradient: None,
             tolerance,
             best_violation: 0.0,
@@ -105,13 +94,6 @@ impl LimitedOptimizer {
         this.best_violation = this.counted_violation();
         this.note_prices();
         Ok(this)
-    }
-
-    /// The same descent, which begins anew at its start where the limits cannot be kept near the lens that it has come
-    /// to.
-    pub(super) fn leading_in(mut self) -> Self {
-        self.may_lead_in = true;
-        self
     }
 
     /// The merit of the current lens without its limits.
@@ -238,19 +220,6 @@ impl LimitedOptimizer {
         values: &[f64],
         step: &LimitedStep,
     ) -> Option<(LimitedPoint, LimitedSum)> {
-        let found = self.try_values(values, &step.change);
-        if found.is_none() {
-            self.method.note_failure(step);
-        }
-        found
-    }
-
-    /// The merit and the limits at the values that a change leads to; `None` where there are none.
-    fn try_values(
-        &mut self,
-        values: &[f64],
-        change: &DVector<f64>,
-    ) -> Option<(LimitedPoint, LimitedSum)> {
         let found = self
             .state
             .check_finite(values)
@@ -261,9 +230,13 @@ impl LimitedOptimizer {
                 let point = scaled_point(&self.state, &found.objective, &found.limits);
                 Some((point, found))
             }
-            Ok(_) => None,
+            Ok(_) => {
+                self.method.note_failure(step);
+                None
+            }
             Err(cause) => {
-                self.state.record_refusal(change.as_slice(), &cause);
+                self.state.record_refusal(step.change.as_slice(), &cause);
+                self.method.note_failure(step);
                 None
             }
         }
@@ -355,11 +328,7 @@ impl LimitedOptimizer {
             OptimizationEnd::Conflict
         });
         if self.end == Some(OptimizationEnd::Conflict) {
-            if self.may_lead_in && self.begin_lead_in() {
-                self.end = None;
-            } else {
-                self.conflict = self.conflict_here();
-            }
+            self.conflict = self.conflict_here();
         }
     }
 }
@@ -392,10 +361,7 @@ impl Optimizer for LimitedOptimizer {
         if self.end.is_some() {
             return self.state.progress(0.0, self.end);
         }
-        let tried = match self.lead_in.take() {
-            Some(lead_in) => Ok(self.try_lead_in_step(lead_in)),
-            None => self.try_step(),
-        };
+        let tried = self.try_step();
         if let Err(end) = tried {
             self.conclude(end);
         } else if self.unchecked >= self.interval {

@@ -46,7 +46,7 @@ impl LimitedOptimizer {
     }
 
     /// Finds the rays of the current lens anew; false if that fails.
-    pub(super) fn find_rays(&mut self) -> bool {
+    fn find_rays(&mut self) -> bool {
         let mut merit = self.state.merit.clone();
         let found = merit
             .resample(&self.state.current)
