@@ -25,12 +25,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// The evaluations after which a descent that has not ended is given up.
 const MOST_EVALUATIONS: usize = 1000;
 /// The starts between two looks at the flag.
-const BATCH: u64 = 64;
-/// The tolerance at which a descent ends: several steps in a row promise less than a thousandth of the merit,
-/// a tenth of what parts two minima.
-const END_TOLERANCE: f64 = 0.1;
-/// Of so many descents one goes on at the tolerance of the spots, which tells whether it had arrived.
-const CHECKED: u64 = 16;
+const BATCH: u64 = 32;
 /// The parts of the way from the lens to random numbers that are tried: of many surfaces few random ones
 /// form an image.
 const SPREADS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
@@ -55,10 +50,6 @@ pub struct MinimaCount {
     pub stuck: u64,
     /// The descents that ended at a minimum.
     pub ended: u64,
-    /// The descents among these that went on until nothing could be gained at the tolerance of the spots.
-    pub checked: u64,
-    /// Those of them that came to another minimum by that.
-    pub moved: u64,
     /// The different minima among these.
     pub distinct: usize,
     /// The signs of curvatures and powers among them.
@@ -108,8 +99,6 @@ struct EndedDescent {
     value: f64,
     /// The decrease of the merit that the derivatives promise within the bounds of the variables.
     promised: f64,
-    /// True if going on led to another minimum; `None` if the descent did not go on.
-    moved: Option<bool>,
 }
 
 /// Counts the minima that descents from random lenses with the structure of a lens find. The same seed gives the same minima on any number of threads. Once
@@ -127,7 +116,7 @@ pub fn count_minima(
     let (watch, tolerance) = (Stopwatch::start(), plan.local.tolerance);
     let mut families: BTreeMap<String, Vec<Minimum>> = BTreeMap::new();
     let (mut begun, mut lost, mut unfinished, mut stuck) = (0, 0, 0, 0);
-    let (mut ended, mut checked, mut moved, mut evaluations) = (0, 0, 0, 0);
+    let (mut ended, mut evaluations) = (0, 0);
     while begun < starts && !stop.load(Ordering::Relaxed) {
         let batch = begun..(begun + BATCH).min(starts);
         begun = batch.end;
@@ -141,8 +130,6 @@ pub fn count_minima(
                 DescentEnd::Stuck => stuck += 1,
                 DescentEnd::Minimum(found) => {
                     ended += 1;
-                    checked += u64::from(found.moved.is_some());
-                    moved += u64::from(found.moved == Some(true));
                     enter(families.entry(found.signs.clone()).or_default(), &found);
                 }
             }
@@ -161,8 +148,6 @@ pub fn count_minima(
         unfinished,
         stuck,
         ended,
-        checked,
-        moved,
         distinct: all.len(),
         families: families.len(),
         found_once,
@@ -192,21 +177,16 @@ fn descend(
         let free = landscape.with_variables(&lens);
         let optimizer = landscape
             .merit(&lens, tolerance)
-            .and_then(|merit| start_from(DescentMethod::TrustRegion, merit, &free, END_TOLERANCE));
+            .and_then(|merit| start_from(DescentMethod::TrustRegion, merit, &free, tolerance));
         let Ok(optimizer) = optimizer else { return (DescentEnd::Lost, used) };
         let Some((mut halted, evaluations)) = halt(optimizer, MOST_EVALUATIONS - used) else {
             return (DescentEnd::Unfinished, MOST_EVALUATIONS);
         };
         used += evaluations;
-        let Ok(mut found) = EndedDescent::new(landscape, &halted, tolerance) else {
+        let Ok(found) = EndedDescent::new(landscape, &halted, tolerance) else {
             return (DescentEnd::Lost, used);
         };
         if found.is_minimum() {
-            if start.is_multiple_of(CHECKED) {
-                let (moved, evaluations) = found.moves_on(landscape, &halted, tolerance);
-                found.moved = moved;
-                used += evaluations;
-            }
             return (DescentEnd::Minimum(Box::new(found)), used);
         }
         if !(found.value < (1.0 - SAME) * before) || used >= MOST_EVALUATIONS {
@@ -243,34 +223,7 @@ impl EndedDescent {
             normal: sum.normal,
             value: sum.value,
             merit,
-            moved: None,
         })
-    }
-
-    /// True if the descent comes to another minimum when it goes on until nothing can be gained at the
-    /// tolerance of the spots, with the evaluations of that; `None` if it does not end.
-    fn moves_on(
-        &self,
-        landscape: &LensLandscape,
-        lens: &Lens,
-        tolerance: f64,
-    ) -> (Option<bool>, usize) {
-        let free = landscape.with_variables(lens);
-        let optimizer = landscape
-            .merit(lens, tolerance)
-            .and_then(|merit| start_from(DescentMethod::TrustRegion, merit, &free, tolerance));
-        let Ok(optimizer) = optimizer else { return (None, 0) };
-        let Some((end, evaluations)) = halt(optimizer, MOST_EVALUATIONS) else {
-            return (None, MOST_EVALUATIONS);
-        };
-        let end = Self::new(landscape, &end, tolerance).ok();
-        let is_other = end.map(|end| end.signs != self.signs || !self.is_same(&end.minimum()));
-        (is_other, evaluations)
-    }
-
-    /// The minimum, found once.
-    fn minimum(&self) -> Minimum {
-        Minimum { values: self.values.clone(), merit: self.value, found: 1 }
     }
 
     /// True if the minimum that the derivatives predict is nearer than two that are the same may be apart.
@@ -331,6 +284,6 @@ fn enter(family: &mut Vec<Minimum>, found: &EndedDescent) {
                 known.values.clone_from(&found.values);
             }
         }
-        None => family.push(found.minimum()),
+        None => family.push(Minimum { values: found.values.clone(), merit: found.value, found: 1 }),
     }
 }

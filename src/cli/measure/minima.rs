@@ -69,8 +69,6 @@ impl Display for MeasureMinimaReport {
             self.seed
         )?;
         writeln!(f, "  {ended} descents ended at a minimum, {stuck} elsewhere")?;
-        let MinimaCount { checked, moved, .. } = &self.found;
-        writeln!(f, "  {checked} of those went on, {moved} of which came to another minimum")?;
         writeln!(f, "  {unfinished} were given up, {lost} were lost")?;
         writeln!(f, "  {distinct} different minima with {families} patterns of signs")?;
         writeln!(f, "  {found_once} were found once, {found_twice} twice")?;

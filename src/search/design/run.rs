@@ -507,7 +507,8 @@ fn second_mutation(
     mutated.ok()
 }
 
-/// The pattern of glass and air with the signs of the powers of all pieces in air.
+/// The pattern of glass and air with the signs of the powers of all pieces in air; a bent lens has the same,
+/// unlike the signs of its curvatures.
 fn structure(lens: &Lens) -> String {
     let pieces = lens.surfaces.windows(2).map(|pair| match pair[0].medium {
         Medium::Air => '|',

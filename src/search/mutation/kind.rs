@@ -52,20 +52,12 @@ impl MutationKind {
     ];
 
     /// All kinds by which an iterated local search perturbs a lens.
-    pub const PERTURBATIONS: [Self; 12] = [
-        Self::AddSinglet,
-        Self::RemoveSinglet,
-        Self::Glue,
-        Self::Split,
-        Self::DropLayer,
-        Self::Bend,
-        Self::Flip,
-        Self::ExchangeGlass,
-        Self::MoveStop,
-        Self::AddAsphere,
-        Self::RemoveAsphere,
-        Self::Displacement,
-    ];
+    pub const PERTURBATIONS: [Self; Self::MUTATIONS.len() + 1] = {
+        let mut all = [Self::Displacement; Self::MUTATIONS.len() + 1];
+        let (mutations, _) = all.split_at_mut(Self::MUTATIONS.len());
+        mutations.copy_from_slice(&Self::MUTATIONS);
+        all
+    };
 
     /// True for the kinds that change which surfaces are aspheric.
     pub fn is_about_aspheres(self) -> bool {

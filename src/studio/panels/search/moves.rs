@@ -33,7 +33,12 @@ pub(super) fn table(ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions)
                 }
             }
             ui.end_row();
-            for kind in kinds() {
+            // Displacements are made where the rules list them, and are no row of other runs.
+            let is_made = |kind: &MutationKind| {
+                *kind != MutationKind::Displacement
+                    || search.run.statistics.kinds.contains_key(kind)
+            };
+            for kind in kinds().filter(is_made) {
                 row(ui, search, kind, actions);
                 ui.end_row();
             }
@@ -93,7 +98,7 @@ fn refusal_summary(ui: &mut Ui, run: &StructureSearchSnapshot) {
 
 /// Every kind, in the order in which they are shown.
 pub(super) fn kinds() -> impl Iterator<Item = MutationKind> {
-    MutationKind::PERTURBATIONS.into_iter().chain([MutationKind::Global])
+    MutationKind::MUTATIONS.into_iter().chain([MutationKind::Global, MutationKind::Displacement])
 }
 
 /// The place of a kind among all.
