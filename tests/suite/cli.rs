@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use std::io::Write as _;
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 const LENS: &str = "lenses/double_gauss_rudolph_50.json";
 const ZOOM: &str = "lenses/zoom_nikkor_28_80.json";
@@ -59,7 +60,9 @@ pub(super) fn has_keys(value: &Value, keys: &[&str]) {
 
 /// A path in the temporary folder that no other test has.
 fn temporary(name: &str) -> PathBuf {
-    std::env::temp_dir().join(format!("aplanat-{}-{name}", std::process::id()))
+    static TAKEN: AtomicUsize = AtomicUsize::new(0);
+    let number = TAKEN.fetch_add(1, Ordering::Relaxed);
+    std::env::temp_dir().join(format!("aplanat-{}-{number}-{name}", std::process::id()))
 }
 
 /// A file that is gone when the test ends.
