@@ -3,13 +3,15 @@
 //! where it is satisfied.
 
 use super::binding::{Configuration, ResolvedSystems};
-use super::first_order::slopes;
-use super::sum::SumOfSquares;
-use super::{EvaluationContext, MeritError, Term, VariableDual, WeightedTerm};
+use super::first_order::slopes_of_all;
+use super::sum::{DerivativeLevel, SumOfSquares};
+use super::{EvaluationContext, MeritError, Term, WeightedTerm};
 use crate::analysis::clear_semi_diameters;
 use crate::lens::{Lens, SurfaceNumber, System, TermScope, TermSelection};
 use crate::math::Real;
 use crate::pupil::RayModel;
+use crate::solve::SeparateResidual;
+use nalgebra::DVector;
 use serde::Serialize;
 
 /// Adds the squared violations of one of the constraints.
@@ -19,10 +21,28 @@ pub(super) fn add_constraints(
     sum: &mut SumOfSquares,
 ) {
     let all = smooth_constraints(context.zoom, context.systems, weighted);
-    for Constraint { quantity, min, max } in all {
-        let number = BoundedLength { quantity, context };
-        min.into_iter().for_each(|min| number.at_least(min, sum));
-        max.into_iter().for_each(|max| number.at_most(max, sum));
+    let violations = |constraint: &Constraint| {
+        let length: f64 = constraint.value(&context.systems.manufactured);
+        let below = constraint.min.map(|min| (-1.0, min - length));
+        let above = constraint.max.map(|max| (1.0, length - max));
+        below.into_iter().chain(above)
+    };
+    // Only a model of the sum needs limits that are kept.
+    let matters = |constraint: &Constraint| {
+        sum.level == DerivativeLevel::Normal || violations(constraint).any(|(_, by)| by > 0.0)
+    };
+    let all: Vec<Constraint> = all.into_iter().filter(matters).collect();
+    let slopes = if sum.level > DerivativeLevel::Value && !all.is_empty() {
+        slopes_of_all(context, &all, |constraint, system| constraint.value(system))
+    } else {
+        vec![DVector::zeros(context.values.len()); all.len()]
+    };
+    for (constraint, slope) in all.iter().zip(slopes) {
+        for (sign, violation) in violations(constraint) {
+            let (value, slope) = (violation, &slope * sign);
+            let residual = SeparateResidual { value, slope, is_one_sided: true, is_cheap: true };
+            sum.add_separate(1.0, residual);
+        }
     }
 }
 
@@ -409,36 +429,4 @@ pub(super) fn sag_at<R: Real>(surface: &crate::lens::Surface<R>, height: R) -> R
 
 pub(super) fn along_light<R: Real>(system: &System<R>, gap: usize) -> R {
     system.light_direction(gap) * system.surfaces[gap].thickness
-}
-
-/// A length of a lens with the derivatives needed for its bounds.
-struct BoundedLength<'a> {
-    quantity: ConstrainedQuantity,
-    context: &'a EvaluationContext<'a>,
-}
-
-impl BoundedLength<'_> {
-    fn at_least(&self, min: f64, sum: &mut SumOfSquares) {
-        let length = self.value();
-        if length < min {
-            self.residual(length - min, sum);
-        }
-    }
-
-    fn at_most(&self, max: f64, sum: &mut SumOfSquares) {
-        let length = self.value();
-        if length > max {
-            self.residual(length - max, sum);
-        }
-    }
-
-    fn value(&self) -> f64 {
-        self.quantity.length(&self.context.systems.manufactured)
-    }
-
-    fn residual(&self, r: f64, sum: &mut SumOfSquares) {
-        let length = |system: &System<VariableDual>| self.quantity.length(system);
-        let slope = slopes(self.context, sum.level, length);
-        sum.add_residual(1.0, r, &slope);
-    }
 }

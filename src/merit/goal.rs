@@ -45,6 +45,11 @@ impl Term {
         )
     }
 
+    /// True if the term limits numbers of the lens that follow without rays.
+    pub(super) fn is_without_rays(self) -> bool {
+        self.is_limit() && !self.concerns_light() && !matches!(self, Self::Operand { .. })
+    }
+
     /// True if the term limits the lens and says nothing about one that keeps the limit.
     pub fn is_limit(self) -> bool {
         !matches!(

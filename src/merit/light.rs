@@ -50,9 +50,9 @@ fn light_shortfall(
         context.sampling.pupils.iter().zip(context.initial_areas).enumerate()
     {
         let least = share * before;
-        if pupil.area < least && pupil.is_in(scope) {
+        if pupil.is_in(scope) && (pupil.area < least || sum.level == DerivativeLevel::Normal) {
             let slope = pupil_area(context, sum.level, i, -1.0 / least).slope;
-            sum.add_residual(pupil.weight / total, 1.0 - pupil.area / least, &slope);
+            sum.add_one_sided(pupil.weight / total, 1.0 - pupil.area / least, slope);
         }
     }
 }
@@ -66,9 +66,7 @@ fn mean_light_shortfall(
     sum: &mut SumOfSquares,
 ) {
     let now = mean_light(context, scope, sum.level);
-    if now.value < share {
-        sum.add_residual(1.0, 1.0 - now.value / share, &(now.slope * (-1.0 / share)));
-    }
+    sum.add_one_sided(1.0, 1.0 - now.value / share, now.slope * (-1.0 / share));
 }
 
 /// The mean area of the pupils of a scope relative to that in the starting lens.
@@ -96,9 +94,8 @@ fn light_loss(area: &WithGradient, factor: f64, start: f64, sum: &mut SumOfSquar
 }
 
 fn illumination(context: &EvaluationContext<'_>, field: usize, min: f64, sum: &mut SumOfSquares) {
-    let found = relative_illumination(context, field, sum.level);
-    if let Some(share) = found.filter(|share| share.value < min) {
-        sum.add_residual(1.0, min - share.value, &-share.slope);
+    if let Some(share) = relative_illumination(context, field, sum.level) {
+        sum.add_one_sided(1.0, min - share.value, -share.slope);
     }
 }
 

@@ -5,7 +5,7 @@
 //! need no rays come first.
 
 use super::constraints::{Constraint, ConstraintMargin, smooth_constraints};
-use super::first_order::focal_length_of;
+use super::first_order::{focal_length_of, slopes_of_all};
 use super::light::{
     WithGradient, axial_f_number, light_shares, mean_light, relative_illumination, total_weight,
 };
@@ -13,6 +13,7 @@ use super::operands::operand_values;
 use super::sum::{DerivativeLevel, SumOfSquares};
 use super::{EvaluationContext, Merit, MeritError, PupilForms, Term, VariableDual, WeightedTerm};
 use crate::lens::{System, TermSelection};
+use crate::solve::SeparateResidual;
 use nalgebra::DVector;
 
 /// A limited number of a lens, with its derivatives.
@@ -113,29 +114,44 @@ impl Merit {
         }
     }
 
+    /// The residuals of the terms that need no rays, with their derivatives, as
+    /// [`SumOfSquares::separate`] has them.
+    ///
+    /// # Errors
+    /// A lens without first-order data.
+    pub fn residuals_without_rays(
+        &self,
+        values: &[f64],
+    ) -> Result<Vec<SeparateResidual>, MeritError> {
+        let level = DerivativeLevel::Normal;
+        let mut sums = vec![SumOfSquares::zero(values.len(), level); self.goal.terms.len()];
+        self.visit_without_pupils(values, |context| {
+            self.add_terms(context, Term::is_without_rays, &mut sums)
+        })?;
+        self.average(&mut sums)?;
+        let residuals = self.weighted_sum(&sums, values.len(), level).separate;
+        Ok(residuals.into_iter().filter(|residual| residual.is_cheap).collect())
+    }
+
     fn add_mechanical_limits(
         &self,
         context: &EvaluationContext<'_>,
         level: DerivativeLevel,
         limits: &mut Vec<Limit>,
     ) {
-        let count = context.values.len();
         let mut numbers = Vec::new();
+        let first = limits.len();
         for weighted in self.goal.terms.iter().filter(|w| self.goal.is_constraint(w.term)) {
             for (number, margin) in self.mechanical_numbers(context, *weighted) {
-                let slope = DVector::zeros(count);
-                numbers.push((number, Limit { margin, slope, weight: weighted.weight }));
+                numbers.push(number);
+                let slope = DVector::zeros(context.values.len());
+                limits.push(Limit { margin, slope, weight: weighted.weight });
             }
         }
         if level > DerivativeLevel::Value {
-            for (first, system) in context.zoom.systems_along(context.systems) {
-                for (number, limit) in &mut numbers {
-                    let slopes = number.of(&system).slope;
-                    limit.slope.iter_mut().skip(first).zip(slopes).for_each(|(to, by)| *to = by);
-                }
-            }
+            let slopes = slopes_of_all(context, &numbers, Mechanical::of);
+            limits[first..].iter_mut().zip(slopes).for_each(|(limit, slope)| limit.slope = slope);
         }
-        limits.extend(numbers.into_iter().map(|(_, limit)| limit));
     }
 
     /// The limited numbers of a term that need no rays; those that nothing limits are left out, such

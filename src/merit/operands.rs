@@ -32,9 +32,12 @@ pub(super) fn add_operand(
 ) -> Result<(), MeritError> {
     for OperandValue { margin, slope } in operand_values(context, weighted, sum.level)? {
         let ConstraintMargin { value, min, max, .. } = margin;
-        let below = min.filter(|min| value < *min);
-        if let Some(bound) = below.or(max.filter(|max| value > *max)) {
-            sum.add_residual(1.0, value - bound, &slope);
+        match (min, max) {
+            (Some(min), Some(max)) if min == max => sum.add_residual(1.0, value - min, &slope),
+            _ => {
+                min.into_iter().for_each(|min| sum.add_one_sided(1.0, min - value, -&slope));
+                max.into_iter().for_each(|max| sum.add_one_sided(1.0, value - max, slope.clone()));
+            }
         }
     }
     Ok(())

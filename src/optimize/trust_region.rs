@@ -9,16 +9,22 @@ use super::state::OptimizerState;
 use super::{OptimizationEnd, OptimizationProgress, Optimizer};
 use crate::lens::Lens;
 use crate::merit::{DerivativeLevel, Merit, MeritError, SumOfSquares, TermValue};
-use crate::solve::{LeastSquaresPoint, TrustRegion, TrustRegionMemory, TrustRegionStep};
+use crate::solve::{
+    LeastSquaresPoint, SeparateResidual, TrustRegion, TrustRegionMemory, TrustRegionStep,
+};
 use nalgebra::DVector;
 
 /// The number of accepted steps between two checks of the rays, at most.
 const CHECK_INTERVAL: usize = 20;
 /// The projected gradient relative to the first one that ends the descent.
 const SMALL_GRADIENT: f64 = 1e-6;
+/// The promised gain relative to the merit above which a small gradient ends nothing.
+const FLAT: f64 = 1e-3;
 /// The number of consecutive steps that promise nothing above the tolerance which end the descent.
 const PATIENCE: usize = 5;
 
+/// The number of corrections of a trial.
+const CORRECTIONS: usize = 3;
 /// The promised gain, relative to the tolerance of the spots, below which a step is idle.
 const SMALL_GAIN: f64 = 1e-2;
 
@@ -95,39 +101,68 @@ impl TrustRegionOptimizer {
         let room = self.state.room();
         let gradient = self.region.projected_gradient(&self.point, &room);
         let step = self.region.propose(&self.point, &room).ok_or(OptimizationEnd::Gradient)?;
-        if gradient <= SMALL_GRADIENT * self.first_gradient {
+        // A step within the region promises no more than one without it, which takes longer to find.
+        let promises_at_most = |part: f64| {
+            let most = part * self.point.value;
+            step.predicted <= most && self.region.attainable_decrease(&self.point, &room) <= most
+        };
+        // At the start of a descent broken limits make gradients that dwarf those of sharpness.
+        if gradient <= SMALL_GRADIENT * self.first_gradient && promises_at_most(FLAT) {
             return Err(OptimizationEnd::Gradient);
         }
-        let promised = self.region.attainable_decrease(&self.point, &room);
-        let is_idle = promised <= SMALL_GAIN * self.tolerance * self.point.value;
+        let is_exhausted = self.region.is_exhausted(&self.point);
+        let is_flat = is_exhausted && promises_at_most(FLAT);
+        let is_idle = promises_at_most(SMALL_GAIN * self.tolerance);
         self.idle = if is_idle { self.idle + 1 } else { 0 };
-        if self.idle >= PATIENCE || self.region.is_exhausted(&self.point) {
+        if self.idle >= PATIENCE {
             return Err(OptimizationEnd::Tolerance);
+        }
+        if is_exhausted {
+            let end = OptimizationEnd::Tolerance;
+            return Err(if is_flat { end } else { OptimizationEnd::NoGain });
         }
         Ok(if self.take(&step) { 1.0 } else { 0.0 })
     }
 
     /// Evaluates a step, and takes it if that lowers the merit.
     fn take(&mut self, step: &TrustRegionStep) -> bool {
-        let change = step.change.as_slice();
-        let values = self.state.proposal(change, 1.0);
+        let values = self.corrected(step);
+        let change = self.state.scaled_change(&values);
         let (sum, pupils) = match self.state.evaluate(&values, DerivativeLevel::Normal) {
             Ok(found) => found,
             Err(cause) => {
-                self.state.record_refusal(change, &cause);
+                self.state.record_refusal(change.as_slice(), &cause);
                 self.region.note_failure(step);
                 return false;
             }
         };
         self.state.evaluations += 1;
         let to = scaled_point(&self.state, &sum);
-        let accepted = self.region.note_trial(step, &self.point, &to);
+        let accepted = self.region.note_trial(step, &change, &self.point, &to);
         if accepted {
             self.state.accept_step(values, sum.value, pupils);
             self.point = to;
             self.unchecked += 1;
         }
         accepted
+    }
+
+    /// The values behind a step, corrected until the residuals that need no rays are as the step has
+    /// promised.
+    fn corrected(&self, step: &TrustRegionStep) -> Vec<f64> {
+        let mut values = self.state.proposal(step.change.as_slice(), 1.0);
+        if !self.point.separate.iter().any(|residual| residual.is_cheap) {
+            return values;
+        }
+        for _ in 0..CORRECTIONS {
+            let found = self.state.check_finite(&values);
+            let found = found.and_then(|()| self.state.merit.residuals_without_rays(&values));
+            let Ok(found) = found else { break };
+            let now = scaled_residuals(&self.state, &found);
+            let Some(change) = self.region.correction(step, &self.point, &now) else { break };
+            values = self.state.moved(&values, change.as_slice());
+        }
+        values
     }
 
     /// Ends the descent, unless the rays turn out to be others by now.
@@ -167,7 +202,21 @@ pub(super) fn scaled_point(state: &OptimizerState, sum: &SumOfSquares) -> LeastS
             normal[(i, j)] *= scales[i] * scales[j];
         }
     }
-    LeastSquaresPoint { value: sum.value, half_gradient, normal }
+    let separate = scaled_residuals(state, &sum.separate);
+    LeastSquaresPoint { value: sum.value, half_gradient, normal, separate }
+}
+
+/// Residuals with their derivatives by scaled variables.
+fn scaled_residuals(
+    state: &OptimizerState,
+    residuals: &[SeparateResidual],
+) -> Vec<SeparateResidual> {
+    let scales = DVector::from_column_slice(&state.scales);
+    let scaled = |residual: &SeparateResidual| SeparateResidual {
+        slope: residual.slope.component_mul(&scales),
+        ..*residual
+    };
+    residuals.iter().map(scaled).collect()
 }
 
 impl Optimizer for TrustRegionOptimizer {

@@ -241,7 +241,8 @@ impl LimitedTrustRegion {
         self.region.choose_model(&plain, &from, from.value - to.value);
         if accepted {
             let gradient_change = &to.half_gradient - &from.half_gradient;
-            self.region.update_secant(&step.change, &gradient_change, &to.normal);
+            let missing = &gradient_change - &to.normal * &step.change;
+            self.region.update_secant(&step.change, &gradient_change, missing);
         }
     }
 
@@ -254,7 +255,7 @@ impl LimitedTrustRegion {
                 normal[(i, i)] += SCALE_SHARE * weight * slope * slope;
             }
         }
-        self.region.update_scales(&normal);
+        self.region.update_scales(&normal.diagonal().map(|square| square.max(0.0).sqrt()));
         self.natural = point.natural_radius();
     }
 
@@ -311,16 +312,21 @@ impl LimitedTrustRegion {
                 hessian[(i, j)] *= 2.0 / (scales[i] * scales[j]);
             }
         }
-        // Where nothing else decides, the shortest step is taken.
-        let shift = 1e-12 * hessian.amax() + SHORTNESS;
-        let shifted = &hessian + DMatrix::identity(scales.len(), scales.len()) * shift;
-        if shifted.clone().cholesky().is_some() {
-            return shifted;
-        }
-        let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(hessian);
-        let curvatures = eigenvalues.map(|value| value.max(0.0) + shift);
-        &eigenvectors * DMatrix::from_diagonal(&curvatures) * eigenvectors.transpose()
+        convex_part(hessian)
     }
+}
+
+/// A Hessian in scaled parameters without its negative curvatures.
+pub(super) fn convex_part(hessian: DMatrix<f64>) -> DMatrix<f64> {
+    // Where nothing else decides, the shortest step is taken.
+    let shift = 1e-12 * hessian.amax() + SHORTNESS;
+    let shifted = &hessian + DMatrix::identity(hessian.nrows(), hessian.nrows()) * shift;
+    if shifted.clone().cholesky().is_some() {
+        return shifted;
+    }
+    let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(hessian);
+    let curvatures = eigenvalues.map(|value| value.max(0.0) + shift);
+    &eigenvectors * DMatrix::from_diagonal(&curvatures) * eigenvectors.transpose()
 }
 
 /// The radius of the first step after a restart, relative to the natural one.
@@ -348,6 +354,7 @@ mod tests {
                 value: residuals.norm_squared(),
                 half_gradient: jacobian.tr_mul(&residuals),
                 normal: jacobian.tr_mul(&jacobian),
+                separate: Vec::new(),
             };
             let weights = vec![1.0; bounds.len()];
             LimitedPoint {

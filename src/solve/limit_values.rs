@@ -101,6 +101,7 @@ impl LimitedPoint {
             value: objective.value + multipliers.dot(&limits.values),
             half_gradient: &objective.half_gradient + limits.slopes.tr_mul(multipliers) * 0.5,
             normal: objective.normal.clone(),
+            separate: Vec::new(),
         }
     }
 }

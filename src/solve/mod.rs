@@ -13,9 +13,12 @@ mod kink;
 mod lbfgs;
 mod levenberg_marquardt;
 mod limit_values;
+mod model_minimum;
 mod projection;
 mod quadratic_program;
 mod restoration;
+mod separate;
+mod sum_kink;
 mod trust_region;
 
 pub use adam::{Adam, AdamMoments};
@@ -34,6 +37,7 @@ pub use projection::{
     ConstrainedPoint, ConstraintError, ConstraintFunction, CoordinateBounds, nearest_point,
     nearest_point_from, point_along_normals,
 };
+pub use separate::SeparateResidual;
 pub use trust_region::{LeastSquaresPoint, TrustRegion, TrustRegionMemory, TrustRegionStep};
 
 /// The scalar product.

@@ -6,9 +6,12 @@
 //! place, which is corrected after every trial so that the model reproduces the change of the
 //! gradient (Dennis, Gay, Welsch, *An adaptive nonlinear least-squares algorithm*, ACM TOMS 7
 //! (1981) 348). The model that predicted the last trial better makes the next step, as far as the
-//! trust region reaches in units of the measured effect of every parameter (Moré 1978).
+//! trust region reaches in units of the measured effect of every parameter (Moré 1978). Limits are in the
+//! model by themselves, and kinks that trials have met.
 
-use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use super::separate::{PiecewiseModel, SeparateResidual};
+use super::sum_kink::SumKinks;
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 /// A sum of squares at one point, with its derivatives.
@@ -20,6 +23,8 @@ pub struct LeastSquaresPoint {
     pub half_gradient: DVector<f64>,
     /// `JᵀJ`.
     pub normal: DMatrix<f64>,
+    /// Residuals that are known by themselves. Those that count are in the sum.
+    pub separate: Vec<SeparateResidual>,
 }
 
 /// The matrix that a step takes for half the Hessian.
@@ -50,6 +55,8 @@ pub struct TrustRegion {
     /// `S`.
     secant: DMatrix<f64>,
     pub(super) model: HessianModel,
+    /// The kinks around the last point.
+    pub(super) kinks: SumKinks,
 }
 
 /// The state of a [`TrustRegion`] in the units of the parameters themselves, whatever they are scaled
@@ -84,6 +91,12 @@ const SHRINKAGE: [f64; 2] = [0.1, 0.5];
 const MODEL_ADVANTAGE: f64 = 1.5;
 /// The smallest scale relative to the largest one.
 const SMALLEST_SCALE: f64 = 1e-8;
+/// The share of one-sided residuals in the effects of the parameters: a descent along a limit is not to be
+/// as short as one against it.
+const SCALE_SHARE: f64 = 1e-2;
+/// The squares of the differences to promised residuals, relative to the predicted decrease, that are not worth a
+/// correction.
+const NEGLIGIBLE: f64 = 1e-3;
 /// The radius relative to the length of the first gradient below which no step is worth taking.
 const SMALLEST_RADIUS: f64 = 1e-12;
 
@@ -95,6 +108,7 @@ impl TrustRegion {
             scales: DVector::zeros(count),
             secant: DMatrix::zeros(count, count),
             model: HessianModel::GaussNewton,
+            kinks: SumKinks::default(),
         }
     }
 
@@ -113,6 +127,7 @@ impl TrustRegion {
                 memory.secant[i * count + j] * units[i] * units[j]
             }),
             model,
+            kinks: SumKinks::default(),
         }
     }
 
@@ -144,25 +159,24 @@ impl TrustRegion {
         point: &LeastSquaresPoint,
         room: &[[f64; 2]],
     ) -> Option<TrustRegionStep> {
-        self.update_scales(&point.normal);
+        self.update_scales(&point.effects(SCALE_SHARE));
         let radius = *self.radius.get_or_insert(point.value.max(0.0).sqrt());
-        let hessian = self.hessian(point, self.model);
-        let change = self.bounded_step(&hessian, &point.half_gradient, room, radius);
-        let predicted = decrease(&hessian, &point.half_gradient, &change);
+        let model = PiecewiseModel { point, hessian: &self.hessian(point, self.model) };
+        let change = self.model_minimum(model, room, radius);
+        let predicted = self.predicted(model, &change);
         (predicted > 0.0).then_some(TrustRegionStep { change, predicted })
     }
 
     /// The largest decrease that the Gauss-Newton model promises within bounds, however long the
     /// step.
     pub fn attainable_decrease(&self, point: &LeastSquaresPoint, room: &[[f64; 2]]) -> f64 {
-        let gradient = &point.half_gradient;
-        let change = self.bounded_step(&point.normal, gradient, room, f64::INFINITY);
-        decrease(&point.normal, gradient, &change)
+        let model = PiecewiseModel { point, hessian: &point.normal };
+        self.predicted(model, &self.model_minimum(model, room, f64::INFINITY))
     }
 
     /// The norm of half the gradient in scaled parameters, without those that their range holds.
     pub fn projected_gradient(&mut self, point: &LeastSquaresPoint, room: &[[f64; 2]]) -> f64 {
-        self.update_scales(&point.normal);
+        self.update_scales(&point.effects(SCALE_SHARE));
         let held = |slope: f64, [low, high]: [f64; 2]| {
             (slope > 0.0 && low >= 0.0) || (slope < 0.0 && high <= 0.0)
         };
@@ -178,10 +192,24 @@ impl TrustRegion {
         self.radius = Some(SHRINKAGE[1] * self.length(&step.change));
     }
 
-    /// Takes note of a trial; true if it is accepted.
+    /// The change that corrects a trial of a step, whose cheap residuals are found to be `now`, until they
+    /// are as the step has promised; `None` if they are, or if that would take more than the step itself.
+    pub fn correction(
+        &self,
+        step: &TrustRegionStep,
+        from: &LeastSquaresPoint,
+        now: &[SeparateResidual],
+    ) -> Option<DVector<f64>> {
+        let negligible = NEGLIGIBLE * step.predicted;
+        let change = from.correction(&step.change, now, &self.scales, negligible)?;
+        (self.length(&change) <= self.length(&step.change)).then_some(change)
+    }
+
+    /// Takes note of a trial of a step that has come to a change by corrections; true if it is accepted.
     pub fn note_trial(
         &mut self,
         step: &TrustRegionStep,
+        change: &DVector<f64>,
         from: &LeastSquaresPoint,
         to: &LeastSquaresPoint,
     ) -> bool {
@@ -190,16 +218,22 @@ impl TrustRegion {
         let accepted = ratio > ACCEPTED && to.value < from.value;
         self.choose_model(step, from, decrease);
         // A rejected trial is too far away to tell the second derivatives here.
-        if accepted {
-            let gradient_change = &to.half_gradient - &from.half_gradient;
-            self.update_secant(&step.change, &gradient_change, &to.normal);
+        if accepted && !self.kinks.follow(change) {
+            let [gradient_change, missing] = from.gradient_change(to, change);
+            self.update_secant(change, &gradient_change, missing);
         }
         self.update_radius(step, from, ratio, to.value);
+        let model = PiecewiseModel { point: from, hessian: &self.hessian(from, self.model) };
+        if !accepted && self.kinks.meet(model, change, to, &self.scales) {
+            // The next step knows better, and need not be shorter for it.
+            self.radius = Some(self.length(&step.change));
+        }
         accepted
     }
 
     /// Takes note that the function has changed a little; `shorter` if its steps were too long.
     pub fn note_other_function(&mut self, shorter: bool) {
+        self.kinks.forget();
         if let Some(radius) = self.radius.as_mut().filter(|_| shorter) {
             *radius *= SHRINKAGE[1];
         }
@@ -216,10 +250,10 @@ impl TrustRegion {
         change.component_mul(&self.scales).norm()
     }
 
-    pub(super) fn update_scales(&mut self, normal: &DMatrix<f64>) {
-        let effects = normal.diagonal().map(|d| d.max(0.0).sqrt());
+    /// Takes note of the effects of the parameters on the residuals.
+    pub(super) fn update_scales(&mut self, effects: &DVector<f64>) {
         let least = SMALLEST_SCALE * effects.max().max(f64::MIN_POSITIVE.sqrt());
-        self.scales.zip_apply(&effects, |scale, effect| *scale = scale.max(effect).max(least));
+        self.scales.zip_apply(effects, |scale, effect| *scale = scale.max(effect).max(least));
     }
 
     /// Changes the model if the other one would have predicted the trial better.
@@ -233,27 +267,26 @@ impl TrustRegion {
             HessianModel::GaussNewton => HessianModel::Augmented,
             HessianModel::Augmented => HessianModel::GaussNewton,
         };
-        let hessian = self.hessian(from, other);
-        let predicted = decrease(&hessian, &from.half_gradient, &step.change);
+        let model = PiecewiseModel { point: from, hessian: &self.hessian(from, other) };
+        let predicted = self.predicted(model, &step.change);
         if MODEL_ADVANTAGE * (real - predicted).abs() < (real - step.predicted).abs() {
             self.model = other;
         }
     }
 
-    /// Corrects `S` so that `(normal + S) change` is the change of half the gradient. `S` is scaled
-    /// down first where it exceeds what was found.
+    /// Corrects `S` so that `S change` is what the matrix does not tell of the change of half the gradient.
+    /// `S` is scaled down first where it exceeds what was found.
     pub(super) fn update_secant(
         &mut self,
         change: &DVector<f64>,
         gradient_change: &DVector<f64>,
-        normal: &DMatrix<f64>,
+        found: DVector<f64>,
     ) {
         let curvature = change.dot(gradient_change);
         let limit = 1e-12 * change.norm() * gradient_change.norm();
         if !(curvature.abs() > limit) || !gradient_change.iter().all(|v| v.is_finite()) {
             return;
         }
-        let found = gradient_change - normal * change;
         let stored = change.dot(&(&self.secant * change));
         let size = (change.dot(&found) / stored).abs();
         if size < 1.0 {
@@ -296,67 +329,6 @@ impl TrustRegion {
         };
         self.radius = Some(radius);
     }
-
-    /// The minimum of the model within the trust region and the bounds: the way to the minimum for
-    /// the free parameters is followed to the first bound, where that parameter is fixed, and the
-    /// minimum is found again for the others.
-    fn bounded_step(
-        &self,
-        hessian: &DMatrix<f64>,
-        gradient: &DVector<f64>,
-        room: &[[f64; 2]],
-        radius: f64,
-    ) -> DVector<f64> {
-        let mut change = DVector::zeros(gradient.len());
-        let held = |i: &usize| {
-            let [low, high] = room[*i];
-            (gradient[*i] >= 0.0 && low >= 0.0) || (gradient[*i] <= 0.0 && high <= 0.0)
-        };
-        let mut free: Vec<usize> = (0..gradient.len()).filter(|i| !held(i)).collect();
-        while !free.is_empty() {
-            let target = self.free_minimum(hessian, gradient, &change, &free, radius);
-            let way = |k: usize| target[k] - change[free[k]];
-            let reach = |k: usize| {
-                let [low, high] = room[free[k]];
-                let bound = if way(k) < 0.0 { low } else { high };
-                if way(k) == 0.0 { f64::INFINITY } else { (bound - change[free[k]]) / way(k) }
-            };
-            let first = (0..free.len()).min_by(|a, b| reach(*a).total_cmp(&reach(*b)));
-            let Some((first, fraction)) = first.map(|k| (k, reach(k))).filter(|(_, t)| *t < 1.0)
-            else {
-                free.iter().zip(target.iter()).for_each(|(i, value)| change[*i] = *value);
-                break;
-            };
-            let steps: Vec<f64> = (0..free.len()).map(|k| fraction.max(0.0) * way(k)).collect();
-            free.iter().zip(steps).for_each(|(i, step)| change[*i] += step);
-            free.remove(first);
-        }
-        change
-    }
-
-    /// The values of the free parameters at the minimum of the model within the trust region, the
-    /// others staying where they are.
-    fn free_minimum(
-        &self,
-        hessian: &DMatrix<f64>,
-        gradient: &DVector<f64>,
-        change: &DVector<f64>,
-        free: &[usize],
-        radius: f64,
-    ) -> DVector<f64> {
-        let mut fixed = change.clone();
-        free.iter().for_each(|i| fixed[*i] = 0.0);
-        let remaining = (radius * radius - self.length(&fixed).powi(2)).max(0.0).sqrt();
-        let slope = gradient + hessian * &fixed;
-        let pick =
-            |all: &DVector<f64>| DVector::from_iterator(free.len(), free.iter().map(|i| all[*i]));
-        let scales = pick(&self.scales);
-        let inner = DMatrix::from_fn(free.len(), free.len(), |i, j| {
-            hessian[(free[i], free[j])] / (scales[i] * scales[j])
-        });
-        minimize_in_ball(inner, &pick(&slope).component_div(&scales), remaining)
-            .component_div(&scales)
-    }
 }
 
 /// `-(2 gᵀd + dᵀHd)`.
@@ -366,49 +338,6 @@ pub(super) fn decrease(
     change: &DVector<f64>,
 ) -> f64 {
     -(2.0 * half_gradient.dot(change) + change.dot(&(hessian * change)))
-}
-
-/// The minimum of `2 gᵀd + dᵀHd` with `|d| ≤ radius`, by the eigenvectors of `H`; directions without
-/// curvature are left alone if the radius is infinite.
-fn minimize_in_ball(hessian: DMatrix<f64>, gradient: &DVector<f64>, radius: f64) -> DVector<f64> {
-    let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(hessian);
-    let slopes = eigenvectors.tr_mul(gradient);
-    let largest = eigenvalues.amax();
-    let flat = 1e-14 * largest;
-    let step = |shift: f64| {
-        slopes.zip_map(&eigenvalues, |slope, value| {
-            let value = value + shift;
-            if value > flat { -slope / value } else { 0.0 }
-        })
-    };
-    let least = eigenvalues.min();
-    let newton = step(0.0);
-    if least > flat && newton.norm() <= radius || radius == f64::INFINITY {
-        return eigenvectors * newton;
-    }
-    // The length falls with the shift: bisection in its logarithm above the least eigenvalue.
-    let base = (-least).max(0.0);
-    let (mut low, mut high) =
-        (1e-16 * largest, gradient.norm() / radius.max(f64::MIN_POSITIVE) + largest);
-    for _ in 0..200 {
-        let middle = (low * high).sqrt();
-        if step(base + middle).norm() > radius {
-            low = middle;
-        } else {
-            high = middle;
-        }
-        if high <= low * (1.0 + 1e-6) {
-            break;
-        }
-    }
-    let mut found = step(base + high);
-    let missing = radius * radius - found.norm_squared();
-    // The hard case: the gradient has no part along the direction of least curvature.
-    if least < -flat && missing > 0.01 * radius * radius {
-        let lowest = eigenvalues.imin();
-        found[lowest] += if slopes[lowest] > 0.0 { -missing.sqrt() } else { missing.sqrt() };
-    }
-    eigenvectors * found
 }
 
 #[cfg(test)]
@@ -422,12 +351,13 @@ mod tests {
             value: 4.0,
             half_gradient: DVector::from_column_slice(&[1.0, -2.0, 0.5, 3.0]),
             normal: DMatrix::from_fn(4, 4, entry),
+            separate: Vec::new(),
         };
         let mut region = TrustRegion::new(4);
         let step = region.propose(&point, &[WIDE; 4]).unwrap();
         let mut to = point.clone();
         (to.value, to.half_gradient) = (2.0, &point.half_gradient * 0.4);
-        assert!(region.note_trial(&step, &point, &to));
+        assert!(region.note_trial(&step, &step.change, &point, &to));
         let units = [2.0, 0.5, 1e-3, 7.0];
         let memory = region.memory(&units).unwrap();
         let text = serde_json::to_string(&memory).unwrap();
@@ -453,6 +383,7 @@ mod tests {
                 value: residuals.norm_squared(),
                 half_gradient: jacobian.tr_mul(&residuals),
                 normal: jacobian.tr_mul(&jacobian),
+                separate: Vec::new(),
             }
         };
         let mut x = DVector::from_column_slice(start);
@@ -464,7 +395,7 @@ mod tests {
             };
             let there = &x + &step.change;
             let to = evaluate(&there);
-            if region.note_trial(&step, &point, &to) {
+            if region.note_trial(&step, &step.change, &point, &to) {
                 (x, point) = (there, to);
             }
             if point.half_gradient.norm() < 1e-12 {
@@ -515,6 +446,49 @@ mod tests {
         assert!((value - 85822.2).abs() < 0.1, "{value} after {trials}");
     }
 
+    /// A quadratic valley whose minimum lies in a corner of three limits, by half parabolas.
+    #[test]
+    fn a_corner_of_limits_is_found_at_once() {
+        let limits = [([1.0, 1.0, 0.0], 1.0), ([0.0, 1.0, 1.0], 0.5), ([1.0, 0.0, -1.0], 0.2)];
+        let center = DVector::from_vec(vec![2.0, 3.0, -1.0]);
+        let evaluate = |x: &DVector<f64>| {
+            let off = (x - &center) * 1e-2;
+            let mut point = LeastSquaresPoint {
+                value: off.norm_squared(),
+                half_gradient: &off * 1e-2,
+                normal: DMatrix::identity(3, 3) * 1e-4,
+                separate: Vec::new(),
+            };
+            for (slope, most) in limits {
+                let slope = DVector::from_row_slice(&slope);
+                let value = slope.dot(x) - most;
+                if value > 0.0 {
+                    point.value += value * value;
+                    point.half_gradient.axpy(value, &slope, 1.0);
+                    point.normal.ger(1.0, &slope, &slope, 1.0);
+                }
+                let (is_one_sided, is_cheap) = (true, true);
+                point.separate.push(SeparateResidual { value, slope, is_one_sided, is_cheap });
+            }
+            point
+        };
+        let mut x = DVector::from_vec(vec![-3.0, -2.0, 0.5]);
+        let mut point = evaluate(&x);
+        let mut region = TrustRegion::new(3);
+        region.radius = Some(10.0);
+        for trial in 0..3 {
+            let Some(step) = region.propose(&point, &[WIDE; 3]) else { break };
+            let to = evaluate(&(&x + &step.change));
+            let (found, promised) = (point.value - to.value, step.predicted);
+            assert!((found / promised - 1.0).abs() < 1e-9 || promised < 1e-12, "{trial}: {found}");
+            if region.note_trial(&step, &step.change, &point, &to) {
+                (x, point) = (x + &step.change, to);
+            }
+        }
+        assert!(point.half_gradient.norm() < 1e-10, "{x} {}", point.half_gradient);
+        assert!(region.attainable_decrease(&point, &[WIDE; 3]) < 1e-12);
+    }
+
     #[test]
     fn a_singular_hessian_and_a_minimum_at_the_start_do_no_harm() {
         let twins = |x: &DVector<f64>| {
@@ -534,6 +508,7 @@ mod tests {
             value: residuals.norm_squared(),
             half_gradient: jacobian.tr_mul(&residuals),
             normal: jacobian.tr_mul(&jacobian),
+            separate: Vec::new(),
         };
         let mut region = TrustRegion::new(2);
         let mut last = f64::INFINITY;

@@ -51,23 +51,25 @@ impl DraftMerit<'_> {
         Some(())
     }
 
+    /// Adds the square of an excess in mm where that is positive; `sign` times the slopes are its
+    /// derivatives.
     fn limit(
         &self,
         (term, surface): (&'static str, Option<usize>),
-        violation: f64,
-        slopes: &[(DraftParameter, f64)],
+        excess: f64,
+        (sign, slopes): (f64, &[(DraftParameter, f64)]),
         sum: &mut ResidualSum,
     ) {
-        if violation != 0.0 {
-            sum.broken.push((term, surface, violation));
-            let mut row = vec![0.0; self.parameters.len()];
-            for (parameter, slope) in slopes {
-                if let Some(i) = self.index_of(*parameter) {
-                    row[i] += slope;
-                }
+        let mut row = vec![0.0; self.parameters.len()];
+        for (parameter, slope) in slopes {
+            if let Some(i) = self.index_of(*parameter) {
+                row[i] += sign * slope;
             }
-            sum.add(self.plan.limit_weight, violation, &row);
         }
+        if excess > 0.0 {
+            sum.broken.push((term, surface, excess));
+        }
+        sum.add_one_sided(self.plan.limit_weight, excess, &row);
     }
 
     fn add_focal_length(&self, sum: &mut ResidualSum) -> Option<()> {
@@ -78,8 +80,9 @@ impl DraftMerit<'_> {
         let target = self.asked.focal_length;
         let room = FOCAL_PART * FOCAL_LENGTH_TOLERANCE * target;
         let off = focal - target;
-        let violation = if off.abs() > room { off - room * off.signum() } else { 0.0 };
-        self.limit(("focal_length", None), violation, &slopes, sum);
+        for sign in [1.0, -1.0] {
+            self.limit(("focal_length", None), sign * off - room, (sign, &slopes), sum);
+        }
         Some(())
     }
 
@@ -89,11 +92,11 @@ impl DraftMerit<'_> {
         let margin = self.plan.margin * self.asked.focal_length;
         let track: f64 = rows.iter().map(|row| row.thickness).sum();
         let slopes: Vec<_> = (0..rows.len()).map(|i| (gap(i), 1.0)).collect();
-        let long = (track - self.asked.track + margin).max(0.0);
-        self.limit(("total_track", None), long, &slopes, sum);
+        let long = track - self.asked.track + margin;
+        self.limit(("total_track", None), long, (1.0, &slopes), sum);
         let last = rows.len() - 1;
-        let short = rows[last].thickness - self.asked.back_focus - margin;
-        self.limit(("back_focus", None), short.min(0.0), &[(gap(last), 1.0)], sum);
+        let short = self.asked.back_focus + margin - rows[last].thickness;
+        self.limit(("back_focus", None), short, (-1.0, &[(gap(last), 1.0)]), sum);
     }
 
     fn add_edge(&self, i: usize, sum: &mut ResidualSum) {
@@ -102,10 +105,7 @@ impl DraftMerit<'_> {
         let least = if rows[i].medium == Medium::Air { 0.0 } else { self.asked.glass_edge };
         let rim = self.rims[i].min(self.rims[i + 1]);
         let (front, rear) = (sag(&rows[i], rim), sag(&rows[i + 1], rim));
-        let short = rows[i].thickness + rear - front - least - margin;
-        if short >= 0.0 {
-            return;
-        }
+        let short = least + margin - (rows[i].thickness + rear - front);
         let mut slopes = vec![(DraftParameter::Surface(i, SurfaceParameter::Thickness), 1.0)];
         for (row, sign) in [(i, -1.0), (i + 1, 1.0)] {
             let by = sag_slopes(&rows[row], rim);
@@ -113,7 +113,7 @@ impl DraftMerit<'_> {
             slopes.extend(by.map(|(p, slope)| (DraftParameter::Surface(row, p), sign * slope)));
         }
         let term = if rows[i].medium == Medium::Air { "air_edge" } else { "glass_edge" };
-        self.limit((term, Some(i)), short, &slopes, sum);
+        self.limit((term, Some(i)), short, (-1.0, &slopes), sum);
     }
 
     fn add_steepness(&self, i: usize, sum: &mut ResidualSum) {
@@ -122,7 +122,7 @@ impl DraftMerit<'_> {
         let over = (curvature * self.rims[i]).abs() - STEEPNESS[0];
         let by = DraftParameter::Surface(i, SurfaceParameter::Curvature);
         let slope = curvature.signum() * self.rims[i] * length;
-        self.limit(("steepness", Some(i)), length * over.max(0.0), &[(by, slope)], sum);
+        self.limit(("steepness", Some(i)), length * over, (1.0, &[(by, slope)]), sum);
     }
 
     /// Keeps a glass inside the map.
@@ -135,20 +135,11 @@ impl DraftMerit<'_> {
         let length = INDEX_LENGTH * self.asked.focal_length;
         let [by_index, by_abbe] =
             [DraftParameter::Surface(i, SurfaceParameter::Index), DraftParameter::Abbe(i)];
-        let over = (nd - high).max(0.0);
-        self.limit(
-            ("glass", Some(i)),
-            length * over,
-            &[(by_index, length), (by_abbe, -length * high_slope)],
-            sum,
-        );
-        let under = (nd - low).min(0.0);
-        self.limit(
-            ("glass", Some(i)),
-            length * under,
-            &[(by_index, length), (by_abbe, -length * low_slope)],
-            sum,
-        );
+        let place = ("glass", Some(i));
+        let above = [(by_index, length), (by_abbe, -length * high_slope)];
+        self.limit(place, length * (nd - high), (1.0, &above), sum);
+        let below = [(by_index, length), (by_abbe, -length * low_slope)];
+        self.limit(place, length * (low - nd), (-1.0, &below), sum);
     }
 }
 

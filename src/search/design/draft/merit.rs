@@ -8,7 +8,7 @@ use crate::search::design::LensRequirements;
 use crate::search::design::judge::{asked_wavelengths, is_aspheric};
 use crate::search::design::rims::StopPlace;
 use crate::search::predicted_gain::QuadraticModel;
-use crate::solve::LeastSquaresPoint;
+use crate::solve::{LeastSquaresPoint, SeparateResidual};
 use crate::trace::{ImagePoints, Rays, SurfaceParameter, TraceSink as _, Tracer};
 use nalgebra::{DMatrix, DVector};
 
@@ -65,7 +65,7 @@ impl ResidualSum {
     fn new(count: usize) -> Self {
         let half_gradient = DVector::zeros(count);
         let normal = DMatrix::zeros(count, count);
-        let point = LeastSquaresPoint { value: 0.0, half_gradient, normal };
+        let point = LeastSquaresPoint { value: 0.0, half_gradient, normal, separate: Vec::new() };
         Self { point, broken: Vec::new() }
     }
 
@@ -75,6 +75,17 @@ impl ResidualSum {
         self.point.value += weight * residual * residual;
         self.point.half_gradient.axpy(weight * residual, &slopes, 1.0);
         self.point.normal.ger(weight, &slopes, &slopes, 1.0);
+    }
+
+    /// Adds a squared residual with its derivatives where it is positive, nothing elsewhere.
+    pub(super) fn add_one_sided(&mut self, weight: f64, residual: f64, slopes: &[f64]) {
+        if residual > 0.0 {
+            self.add(weight, residual, slopes);
+        }
+        let slope = DVector::from_column_slice(slopes);
+        let (value, is_one_sided, is_cheap) = (residual, true, false);
+        let residual = SeparateResidual { value, slope, is_one_sided, is_cheap };
+        self.point.separate.push(residual.scaled(weight));
     }
 }
 
@@ -353,7 +364,7 @@ impl<'a> DraftMerit<'a> {
         let most = (self.asked.distortion * (1.0 - 5.0 * self.plan.margin)) * slope.abs();
         let off = channel.y[ray] - focal * slope;
         let over = off.abs() - most * focal.abs();
-        if over <= 0.0 || slope == 0.0 {
+        if slope == 0.0 {
             return;
         }
         let count = self.parameters.len();
@@ -364,8 +375,11 @@ impl<'a> DraftMerit<'a> {
                 row[i] -= of_focal * by;
             }
         }
-        sum.broken.push(("distortion", None, over));
-        sum.add(self.plan.limit_weight, over * off.signum(), &row);
+        row.iter_mut().for_each(|by| *by *= off.signum());
+        if over > 0.0 {
+            sum.broken.push(("distortion", None, over));
+        }
+        sum.add_one_sided(self.plan.limit_weight, over, &row);
     }
 
     /// The focal length in mm with its derivatives, from a paraxial ray traced forwards and its

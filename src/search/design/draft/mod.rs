@@ -182,7 +182,7 @@ fn take_trials(
         match merit.evaluate(&next) {
             None => region.note_failure(&step),
             Some(to) => {
-                if region.note_trial(&step, &point, &to) {
+                if region.note_trial(&step, &step.change, &point, &to) {
                     (values, point) = (next, to);
                 }
             }
