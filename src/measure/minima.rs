@@ -2,9 +2,7 @@
 //!
 //! A descent ends at a minimum when the optimizer says so: its gradient has vanished, or nothing can be
 //! gained at the tolerance of the spots. With rays found anew, the derivatives must then promise less than
-//! the distance below which two minima are the same; otherwise the descent begins again from there. At a
-//! kink of the merit, as where two rims are equally narrow, the derivatives of one side promise what the
-//! other one takes; there the descent that begins again must gain nothing and end in the same way.
+//! the distance below which two minima are the same; otherwise the descent begins again from there.
 //!
 //! Two minima are the same if the signs of their curvatures and powers are, and if they are near in the
 //! metric of the residuals: `d² = dxᵀ Jᵀ J dx / F` predicts the relative change of the merit between
@@ -13,7 +11,7 @@
 use super::timing::Stopwatch;
 use crate::lens::{Lens, Variable};
 use crate::merit::{DerivativeLevel, Merit, MeritError, SumOfSquares};
-use crate::optimize::{DescentMethod, OptimizationEnd, Optimizer, start_from};
+use crate::optimize::{DescentMethod, Optimizer, start_from};
 use crate::search::Random;
 use crate::search::lens_landscape::{LensLandscape, SearchPlan, SearchSetupError, curvature_signs};
 use crate::solve::{LeastSquaresPoint, TrustRegion};
@@ -181,18 +179,17 @@ fn descend(
             .merit(&lens, tolerance)
             .and_then(|merit| start_from(DescentMethod::TrustRegion, merit, &free, tolerance));
         let Ok(optimizer) = optimizer else { return (DescentEnd::Lost, used) };
-        let Some((mut halted, end, evaluations)) = halt(optimizer, MOST_EVALUATIONS - used) else {
+        let Some((mut halted, evaluations)) = halt(optimizer, MOST_EVALUATIONS - used) else {
             return (DescentEnd::Unfinished, MOST_EVALUATIONS);
         };
         used += evaluations;
         let Ok(found) = EndedDescent::new(landscape, &halted, tolerance) else {
             return (DescentEnd::Lost, used);
         };
-        let is_over = !(found.value < (1.0 - SAME) * before);
-        if found.is_minimum() || is_over && end != OptimizationEnd::NoGain {
+        if found.is_minimum() {
             return (DescentEnd::Minimum(Box::new(found)), used);
         }
-        if is_over || used >= MOST_EVALUATIONS {
+        if !(found.value < (1.0 - SAME) * before) || used >= MOST_EVALUATIONS {
             return (DescentEnd::Stuck, used);
         }
         halted.variables.clone_from(&drawn.variables);
@@ -200,12 +197,12 @@ fn descend(
     }
 }
 
-/// The lens where an optimizer comes to a halt, why it does, and its evaluations; `None` after too many.
-fn halt(mut optimizer: Box<dyn Optimizer>, most: usize) -> Option<(Lens, OptimizationEnd, usize)> {
+/// The lens where an optimizer comes to a halt, and its evaluations; `None` after too many.
+fn halt(mut optimizer: Box<dyn Optimizer>, most: usize) -> Option<(Lens, usize)> {
     loop {
         let progress = optimizer.step();
-        if let Some(end) = progress.end {
-            return Some((optimizer.best().clone(), end, progress.evaluations));
+        if progress.finished {
+            return Some((optimizer.best().clone(), progress.evaluations));
         }
         if progress.evaluations >= most {
             return None;

@@ -33,7 +33,7 @@ pub(super) fn add_constraints(
     };
     let all: Vec<Constraint> = all.into_iter().filter(matters).collect();
     let slopes = if sum.level > DerivativeLevel::Value && !all.is_empty() {
-        slopes_of_all(context, &all, |constraint, system| constraint.value(system))
+        slopes_of_all(context, &all, Constraint::value)
     } else {
         vec![DVector::zeros(context.values.len()); all.len()]
     };
@@ -41,7 +41,7 @@ pub(super) fn add_constraints(
         for (sign, violation) in violations(constraint) {
             let (value, slope) = (violation, &slope * sign);
             let residual = SeparateResidual { value, slope, is_one_sided: true, is_cheap: true };
-            sum.add_separate(1.0, residual);
+            sum.add_separate(1.0, &residual);
         }
     }
 }

@@ -13,7 +13,7 @@ pub(super) fn focal_length(context: &EvaluationContext<'_>, target: f64, sum: &m
     let focal = focal_length_of(&context.systems.clipped[context.zoom.primary]);
     let (value, slope) = (focal - target, slopes(context, sum.level, focal_length_of));
     let residual = SeparateResidual { value, slope, is_one_sided: false, is_cheap: true };
-    sum.add_separate(1.0, residual);
+    sum.add_separate(1.0, &residual);
 }
 
 /// The derivatives of a first-order number by the variables; zeros if only the value is asked for.

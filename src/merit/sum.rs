@@ -71,7 +71,7 @@ impl SumOfSquares {
     }
 
     /// Adds `weight r²` of a residual that a model of the sum is to know by itself.
-    pub fn add_separate(&mut self, weight: f64, residual: SeparateResidual) {
+    pub fn add_separate(&mut self, weight: f64, residual: &SeparateResidual) {
         if residual.counts() {
             self.add_residual(weight, residual.value, &residual.slope);
         }
@@ -86,7 +86,7 @@ impl SumOfSquares {
     pub fn add_one_sided(&mut self, weight: f64, r: f64, slope: DVector<f64>) {
         let (is_one_sided, is_cheap) = (true, false);
         let residual = SeparateResidual { value: r, slope, is_one_sided, is_cheap };
-        self.add_separate(weight, residual);
+        self.add_separate(weight, &residual);
     }
 
     /// True if every number in it is finite.

@@ -312,21 +312,16 @@ impl LimitedTrustRegion {
                 hessian[(i, j)] *= 2.0 / (scales[i] * scales[j]);
             }
         }
-        convex_part(hessian)
+        // Where nothing else decides, the shortest step is taken.
+        let shift = 1e-12 * hessian.amax() + SHORTNESS;
+        let shifted = &hessian + DMatrix::identity(scales.len(), scales.len()) * shift;
+        if shifted.clone().cholesky().is_some() {
+            return shifted;
+        }
+        let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(hessian);
+        let curvatures = eigenvalues.map(|value| value.max(0.0) + shift);
+        &eigenvectors * DMatrix::from_diagonal(&curvatures) * eigenvectors.transpose()
     }
-}
-
-/// A Hessian in scaled parameters without its negative curvatures.
-pub(super) fn convex_part(hessian: DMatrix<f64>) -> DMatrix<f64> {
-    // Where nothing else decides, the shortest step is taken.
-    let shift = 1e-12 * hessian.amax() + SHORTNESS;
-    let shifted = &hessian + DMatrix::identity(hessian.nrows(), hessian.nrows()) * shift;
-    if shifted.clone().cholesky().is_some() {
-        return shifted;
-    }
-    let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(hessian);
-    let curvatures = eigenvalues.map(|value| value.max(0.0) + shift);
-    &eigenvectors * DMatrix::from_diagonal(&curvatures) * eigenvectors.transpose()
 }
 
 /// The radius of the first step after a restart, relative to the natural one.

@@ -1,8 +1,6 @@
 //! The minimum of the model of a sum of squares within a trust region.
 
 use super::TrustRegion;
-use super::constrained::{convex_part, scaled_room};
-use super::quadratic_program::QuadraticProgram;
 use super::separate::{LeastAlong, PiecewiseModel};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -10,72 +8,10 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 const MAX_PIECES: usize = 30;
 /// The gain relative to all so far that is worth no further piece.
 const SMALL_PIECE: f64 = 1e-4;
-/// The pieces in which it is looked for among kinks, and the parts of the way to the minimum of each that are
-/// tried.
-const MAX_KINKED_PIECES: usize = 6;
-const PARTS: [f64; 4] = [1.0, 0.5, 0.25, 0.1];
-/// The radius of a step among kinks that nothing confines, relative to the first one.
-const UNCONFINED: f64 = 100.0;
 
 impl TrustRegion {
-    /// The decrease that a model with the kinks that were met promises.
-    pub(super) fn predicted(&self, model: PiecewiseModel<'_>, change: &DVector<f64>) -> f64 {
-        model.decrease(change) - self.kinks.rise(change)
-    }
-
-    /// The minimum of a model with the kinks that were met within the trust region and the bounds.
-    pub(super) fn model_minimum(
-        &self,
-        model: PiecewiseModel<'_>,
-        room: &[[f64; 2]],
-        radius: f64,
-    ) -> DVector<f64> {
-        let smooth = self.smooth_minimum(model, room, radius);
-        if self.kinks.rise(&smooth) <= 0.0 {
-            return smooth;
-        }
-        let mut change = DVector::zeros(smooth.len());
-        for _ in 0..MAX_KINKED_PIECES {
-            let Some(target) = self.kinked_step(model, &change, room, radius) else { break };
-            let promised = |change: &DVector<f64>| self.predicted(model, change);
-            let parts = PARTS.iter().map(|part| &change + (&target - &change) * *part);
-            let best = parts.max_by(|a, b| promised(a).total_cmp(&promised(b)));
-            let gained = promised(&change);
-            match best.filter(|best| promised(best) > gained * (1.0 + SMALL_PIECE)) {
-                Some(best) => change = best,
-                None => break,
-            }
-        }
-        change
-    }
-
-    /// The minimum of the parabola that a model is behind a change, with the kinks that were met.
-    fn kinked_step(
-        &self,
-        model: PiecewiseModel<'_>,
-        change: &DVector<f64>,
-        room: &[[f64; 2]],
-        radius: f64,
-    ) -> Option<DVector<f64>> {
-        let (hessian, gradient) = model.piece(change);
-        let scales = &self.scales;
-        let entry = |i: usize, j: usize| 2.0 * hessian[(i, j)] / (scales[i] * scales[j]);
-        let hessian = convex_part(DMatrix::from_fn(scales.len(), scales.len(), entry));
-        let (rows, bounds) = self.kinks.rows(scales);
-        let program = QuadraticProgram {
-            hessian: &hessian,
-            gradient: &(gradient.component_div(scales) * 2.0),
-            rows: &rows,
-            bounds: &bounds,
-            room: &scaled_room(room, scales),
-            radius: radius.min(UNCONFINED * model.point.value.max(f64::MIN_POSITIVE).sqrt()),
-            elastic: Some(&vec![1.0; bounds.len()]),
-        };
-        program.solve().map(|found| found.x.component_div(scales))
-    }
-
     /// The minimum of a model within the trust region and the bounds, from piece to piece.
-    fn smooth_minimum(
+    pub(super) fn model_minimum(
         &self,
         model: PiecewiseModel<'_>,
         room: &[[f64; 2]],

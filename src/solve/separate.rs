@@ -170,19 +170,6 @@ impl LeastSquaresPoint {
         [gradient, missing]
     }
 
-    /// The sum, half its gradient and the matrix without the separate residuals.
-    pub(super) fn without_separate(&self) -> (f64, DVector<f64>, DMatrix<f64>) {
-        let (mut value, mut gradient) = (self.value, self.half_gradient.clone());
-        let mut normal = self.normal.clone();
-        for SeparateResidual { value: r, slope, .. } in self.separate.iter().filter(|r| r.counts())
-        {
-            value -= r * r;
-            gradient.axpy(-r, slope, 1.0);
-            normal.ger(-1.0, slope, slope, 1.0);
-        }
-        (value, gradient, normal)
-    }
-
     /// The effects of the parameters on the residuals, of which separate ones have a share whether they
     /// count or not.
     pub(super) fn effects(&self, share: f64) -> DVector<f64> {

@@ -7,10 +7,9 @@
 //! gradient (Dennis, Gay, Welsch, *An adaptive nonlinear least-squares algorithm*, ACM TOMS 7
 //! (1981) 348). The model that predicted the last trial better makes the next step, as far as the
 //! trust region reaches in units of the measured effect of every parameter (Moré 1978). Limits are in the
-//! model by themselves, and kinks that trials have met.
+//! model by themselves.
 
 use super::separate::{PiecewiseModel, SeparateResidual};
-use super::sum_kink::SumKinks;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -55,8 +54,6 @@ pub struct TrustRegion {
     /// `S`.
     secant: DMatrix<f64>,
     pub(super) model: HessianModel,
-    /// The kinks around the last point.
-    pub(super) kinks: SumKinks,
 }
 
 /// The state of a [`TrustRegion`] in the units of the parameters themselves, whatever they are scaled
@@ -91,8 +88,8 @@ const SHRINKAGE: [f64; 2] = [0.1, 0.5];
 const MODEL_ADVANTAGE: f64 = 1.5;
 /// The smallest scale relative to the largest one.
 const SMALLEST_SCALE: f64 = 1e-8;
-/// The share of one-sided residuals in the effects of the parameters: a descent along a limit is not to be
-/// as short as one against it.
+/// The share of separate residuals in the effects of the parameters: steps along a limit are not to be as
+/// short as those against it.
 const SCALE_SHARE: f64 = 1e-2;
 /// The squares of the differences to promised residuals, relative to the predicted decrease, that are not worth a
 /// correction.
@@ -108,7 +105,6 @@ impl TrustRegion {
             scales: DVector::zeros(count),
             secant: DMatrix::zeros(count, count),
             model: HessianModel::GaussNewton,
-            kinks: SumKinks::default(),
         }
     }
 
@@ -127,7 +123,6 @@ impl TrustRegion {
                 memory.secant[i * count + j] * units[i] * units[j]
             }),
             model,
-            kinks: SumKinks::default(),
         }
     }
 
@@ -163,7 +158,7 @@ impl TrustRegion {
         let radius = *self.radius.get_or_insert(point.value.max(0.0).sqrt());
         let model = PiecewiseModel { point, hessian: &self.hessian(point, self.model) };
         let change = self.model_minimum(model, room, radius);
-        let predicted = self.predicted(model, &change);
+        let predicted = model.decrease(&change);
         (predicted > 0.0).then_some(TrustRegionStep { change, predicted })
     }
 
@@ -171,7 +166,7 @@ impl TrustRegion {
     /// step.
     pub fn attainable_decrease(&self, point: &LeastSquaresPoint, room: &[[f64; 2]]) -> f64 {
         let model = PiecewiseModel { point, hessian: &point.normal };
-        self.predicted(model, &self.model_minimum(model, room, f64::INFINITY))
+        model.decrease(&self.model_minimum(model, room, f64::INFINITY))
     }
 
     /// The norm of half the gradient in scaled parameters, without those that their range holds.
@@ -218,22 +213,16 @@ impl TrustRegion {
         let accepted = ratio > ACCEPTED && to.value < from.value;
         self.choose_model(step, from, decrease);
         // A rejected trial is too far away to tell the second derivatives here.
-        if accepted && !self.kinks.follow(change) {
+        if accepted {
             let [gradient_change, missing] = from.gradient_change(to, change);
             self.update_secant(change, &gradient_change, missing);
         }
         self.update_radius(step, from, ratio, to.value);
-        let model = PiecewiseModel { point: from, hessian: &self.hessian(from, self.model) };
-        if !accepted && self.kinks.meet(model, change, to, &self.scales) {
-            // The next step knows better, and need not be shorter for it.
-            self.radius = Some(self.length(&step.change));
-        }
         accepted
     }
 
     /// Takes note that the function has changed a little; `shorter` if its steps were too long.
     pub fn note_other_function(&mut self, shorter: bool) {
-        self.kinks.forget();
         if let Some(radius) = self.radius.as_mut().filter(|_| shorter) {
             *radius *= SHRINKAGE[1];
         }
@@ -268,7 +257,7 @@ impl TrustRegion {
             HessianModel::Augmented => HessianModel::GaussNewton,
         };
         let model = PiecewiseModel { point: from, hessian: &self.hessian(from, other) };
-        let predicted = self.predicted(model, &step.change);
+        let predicted = model.decrease(&step.change);
         if MODEL_ADVANTAGE * (real - predicted).abs() < (real - step.predicted).abs() {
             self.model = other;
         }
