@@ -4,6 +4,9 @@
 //! The merit of a step is that of rays found for an earlier lens. From time to time rays are found
 //! anew: as long as both merits agree to the tolerance of the spots the earlier ones stay, so that
 //! the function does not change under the method; otherwise the new ones take their place.
+//!
+//! Limits as penalties are known to the model by themselves, and what needs no rays, such as a focal
+//! length, is kept as a step has promised it.
 
 use super::state::OptimizerState;
 use super::{OptimizationEnd, OptimizationProgress, Optimizer};

@@ -247,7 +247,7 @@ mod tests {
             };
             for residual in &self.one_sided {
                 let (value, slope) = (residual.behind(x), residual.slope.clone());
-                if value > 0.0 {
+                if residual.would_count(value) {
                     point.value += value * value;
                     point.half_gradient.axpy(value, &slope, 1.0);
                     point.normal.ger(1.0, &slope, &slope, 1.0);
@@ -308,7 +308,8 @@ mod tests {
             let [from, to] = [from, to].map(|point: [f64; 2]| DVector::from_row_slice(&point));
             let at = |part: f64| model.decrease(&(&from + (&to - &from) * part));
             let found = model.least_along(&from, &to);
-            let best = (0..=1000).map(|i| at(i as f64 / 1000.0)).fold(f64::NEG_INFINITY, f64::max);
+            let best =
+                (0..=1000).map(|i| at(f64::from(i) / 1000.0)).fold(f64::NEG_INFINITY, f64::max);
             assert!(at(found.part) >= best, "{from} {to}: {found:?}");
         }
     }

@@ -76,6 +76,38 @@ fn the_trust_region_method_arrives_at_the_minimum() {
     }
 }
 
+/// Several limits hold a lens whose focal length is stiff: penalties lead to where constraints do, and not
+/// by many short steps along the edges of limits.
+#[test]
+fn penalties_arrive_where_constraints_do() {
+    let mut lens = bundled("tessar_50_f28");
+    lens.aperture = Aperture::EntrancePupilDiameter(50.0 / 5.6);
+    lens.wavelengths = vec![lens.wavelengths[lens.primary()]];
+    lens.fields.values.iter_mut().zip([0.0, 10.0, 15.0]).for_each(|(point, y)| point.y = y);
+    lens.surfaces.iter_mut().for_each(|row| row.semi_diameter = None);
+    lens.variables.clear();
+    add_variables(&mut lens, &[ParameterKind::Curvatures, ParameterKind::Thicknesses]);
+    let terms = [
+        Term::Spot,
+        Term::FocalLength(50.0),
+        Term::GlassCenter { min: 1.0, max: 20.0 },
+        Term::AirCenter { min: 0.1, max: 60.0 },
+    ];
+    let [penalties, constraints] =
+        [LimitTreatment::Penalties, LimitTreatment::Constraints].map(|limits| {
+            let terms = terms.map(|term| WeightedTerm::new(term, 1.0)).to_vec();
+            let pupil = PupilEdge::Moving;
+            let goal = Goal { terms, pupil, zoom_ratios: Vec::new(), limits };
+            let mut optimizer = start(DescentMethod::TrustRegion, &lens, &goal, 1e-6).unwrap();
+            let steps = (0..1000).take_while(|_| !optimizer.step().finished).count();
+            let found: f64 = optimizer.terms().unwrap().iter().map(|t| t.weight * t.value).sum();
+            println!("{limits:?}: {found:.5e} after {steps} steps");
+            (found, steps)
+        });
+    assert!((penalties.0 / constraints.0 - 1.0).abs() < 2e-3, "{penalties:?} {constraints:?}");
+    assert!(penalties.1 < 300, "{penalties:?}");
+}
+
 /// The merit that the optimizer reports is that of the lens in its file, whose aperture is an
 /// f-number: the stop has changed with the lens.
 #[test]

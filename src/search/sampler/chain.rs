@@ -284,7 +284,10 @@ impl<L: Landscape> RoundContext<'_, L> {
         job: Option<BruteForceJob>,
         random: &mut Random,
     ) -> Option<DescentEnd> {
-        let SearchSettings { termination, c, longest, .. } = *self.settings;
+        let SearchSettings { method, termination, c, longest, .. } = *self.settings;
+        // Where no structure may stay, the next mutation is worth more than the next move.
+        let is_outside = method == SearchMethod::Restore
+            && self.landscape.structure_violation(&descent.point) > 0;
         let chance = termination.chance(self.temperature, c, before, descent.loss);
         if !descent.loss.is_finite() {
             Some(DescentEnd::InfiniteLoss)
@@ -292,7 +295,7 @@ impl<L: Landscape> RoundContext<'_, L> {
             // A descent whose moves take no gradients would never use up its budget.
             let spent = descent.gradients >= job.budget || descent.moves >= job.budget;
             spent.then_some(DescentEnd::Budget)
-        } else if random.random::<f64>() < chance {
+        } else if random.random::<f64>() < chance || is_outside {
             Some(DescentEnd::Regeneration)
         } else {
             (descent.moves >= longest as u64).then_some(DescentEnd::MaxMoves)
