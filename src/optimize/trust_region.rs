@@ -113,16 +113,14 @@ impl TrustRegionOptimizer {
         if gradient <= SMALL_GRADIENT * self.first_gradient && promises_at_most(FLAT) {
             return Err(OptimizationEnd::Gradient);
         }
-        let is_exhausted = self.region.is_exhausted(&self.point);
-        let is_flat = is_exhausted && promises_at_most(FLAT);
+        if self.region.is_exhausted(&self.point) {
+            let is_flat = promises_at_most(FLAT);
+            return Err(if is_flat { OptimizationEnd::Tolerance } else { OptimizationEnd::NoGain });
+        }
         let is_idle = promises_at_most(SMALL_GAIN * self.tolerance);
         self.idle = if is_idle { self.idle + 1 } else { 0 };
         if self.idle >= PATIENCE {
             return Err(OptimizationEnd::Tolerance);
-        }
-        if is_exhausted {
-            let end = OptimizationEnd::Tolerance;
-            return Err(if is_flat { end } else { OptimizationEnd::NoGain });
         }
         Ok(if self.take(&step) { 1.0 } else { 0.0 })
     }

@@ -91,8 +91,8 @@ const SMALLEST_SCALE: f64 = 1e-8;
 /// The share of separate residuals in the effects of the parameters: steps along a limit are not to be as
 /// short as those against it.
 const SCALE_SHARE: f64 = 1e-2;
-/// The squares of the differences to promised residuals, relative to the predicted decrease, that are not worth a
-/// correction.
+/// The squares of the differences to promised residuals, relative to the predicted decrease, that are
+/// not worth a correction.
 const NEGLIGIBLE: f64 = 1e-3;
 /// The radius relative to the length of the first gradient below which no step is worth taking.
 const SMALLEST_RADIUS: f64 = 1e-12;

@@ -79,7 +79,8 @@ impl ResidualSum {
 
     /// Adds a squared residual with its derivatives where it is positive, nothing elsewhere.
     pub(super) fn add_one_sided(&mut self, weight: f64, residual: f64, slopes: &[f64]) {
-        if residual > 0.0 {
+        // One that is not a number makes the sum none, and is refused with it.
+        if residual > 0.0 || residual.is_nan() {
             self.add(weight, residual, slopes);
         }
         let slope = DVector::from_column_slice(slopes);
