@@ -142,7 +142,7 @@ pub enum Term {
     /// One minus the ratio of the mean pupil area to this area in mm²: (4.3).
     ThroughputLoss(f64),
     /// The mean squared shortfall of the area of each pupil from this fraction of its area in the
-    /// starting lens.
+    /// starting lens; on the axis, of the area that each rim would leave by itself.
     Light(f64),
     /// The squared shortfall of the mean area of the pupils over fields and wavelengths by weight
     /// from this fraction of that of the starting lens.

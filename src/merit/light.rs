@@ -38,7 +38,8 @@ pub(super) fn add_light_term(
     }
 }
 
-/// Adds the squared shortfalls of the pupil areas from a fraction of their initial areas.
+/// Adds the squared shortfalls of the pupil areas from a fraction of their initial areas. On the axis every
+/// rim that takes too much light by itself adds its own.
 fn light_shortfall(
     context: &EvaluationContext<'_>,
     share: f64,
@@ -50,11 +51,56 @@ fn light_shortfall(
         context.sampling.pupils.iter().zip(context.initial_areas).enumerate()
     {
         let least = share * before;
-        if pupil.is_in(scope) && (pupil.area < least || sum.level == DerivativeLevel::Normal) {
-            let slope = pupil_area(context, sum.level, i, -1.0 / least).slope;
-            sum.add_one_sided(pupil.weight / total, 1.0 - pupil.area / least, slope);
+        if !pupil.is_in(scope) || (pupil.area >= least && sum.level < DerivativeLevel::Normal) {
+            continue;
+        }
+        for area in areas_by_rim(context, sum.level, i, least) {
+            // A rim that takes nothing keeps its place, so that the sums of two lenses have the same.
+            let (shortfall, slope) = match area {
+                Some(area) => (1.0 - area.value / least, area.slope / -least),
+                None => (-1.0, DVector::zeros(context.values.len())),
+            };
+            sum.add_one_sided(pupil.weight / total, shortfall, slope);
         }
     }
+}
+
+/// The area up to which that of a rim is followed, relative to the area of the pupil or to that asked for.
+const NEAR_RIM: f64 = 1.3;
+
+/// The area of a pupil in mm²; on the axis at the place of the rim that ends it, among those that the rims
+/// of all surfaces would leave by themselves. The first one has no rim; what is far larger is left out.
+///
+/// The least of these areas, which is that of the pupil, has a kink where another rim becomes the narrowest
+/// one, and descents halt there.
+fn areas_by_rim(
+    context: &EvaluationContext<'_>,
+    level: DerivativeLevel,
+    pupil: usize,
+    least: f64,
+) -> Vec<Option<WithGradient>> {
+    let area = pupil_area(context, level, pupil, 1.0);
+    let sampled = &context.sampling.pupils[pupil];
+    let on_axis = context.traced_pupils.get(pupil).filter(|_| context.sampling.is_axial(sampled));
+    let Some(traced) = on_axis else { return vec![Some(area)] };
+    let most = match level {
+        DerivativeLevel::Normal => NEAR_RIM * area.value.max(least),
+        DerivativeLevel::Value | DerivativeLevel::Gradient => least,
+    };
+    let surfaces = context.systems.clipped[sampled.wavelength].surfaces.len();
+    let mut areas: Vec<Option<WithGradient>> = Vec::new();
+    areas.resize_with(1 + surfaces, || None);
+    areas[traced.axial_rim().map_or(0, |surface| 1 + surface)] = Some(area);
+    for rim in traced.other_axial_rims(most) {
+        let slope = if level == DerivativeLevel::Value {
+            DVector::zeros(context.values.len())
+        } else {
+            let by_number = traced.axial_rim_motion(&rim);
+            context.zoom.by_variables(context.systems, sampled.wavelength, &by_number)
+        };
+        areas[1 + rim.surface] = Some(WithGradient { value: rim.area, slope });
+    }
+    areas
 }
 
 /// Adds the squared shortfall of the mean area of the pupils from a fraction of the initial one,

@@ -465,6 +465,12 @@ impl RaySampling {
         self.fields.iter().position(|field| field.x == 0.0 && field.y == 0.0)
     }
 
+    /// True if a pupil is that of a field on the axis.
+    pub(super) fn is_axial(&self, pupil: &SampledPupil) -> bool {
+        let field = self.fields[pupil.field];
+        field.x == 0.0 && field.y == 0.0
+    }
+
     /// The cosine of the angle with the axis at which the beam of a field arrives.
     pub(super) fn cosine(&self, field: usize) -> Option<f64> {
         self.pupils.iter().find(|pupil| pupil.field == field)?.cosine

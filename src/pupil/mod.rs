@@ -39,9 +39,9 @@ pub use patterns::{PupilPattern, pattern_points};
 pub use ray_model::{Aiming, Channel, Dual2, Neglected, PupilMeasure, RayModel, RayModelError};
 pub use real_beam::filled_stop_radius;
 pub use region::{
-    Accuracy, Annulus, Boundary, BoundaryArc, ConvergedList, ConvergedValues, DarkPupil, EdgeArc,
-    EdgeCurves, EdgePoint, EdgeRay, Nodes, OutlineSide, PolarFrame, PupilLimit, PupilMoments,
-    PupilOutline, PupilRadius, Region, RegionKind, TracedNodes, TracedPupil, converge,
-    converge_every_order, converge_list, converge_resolved,
+    Accuracy, Annulus, AxialRim, Boundary, BoundaryArc, ConvergedList, ConvergedValues, DarkPupil,
+    EdgeArc, EdgeCurves, EdgePoint, EdgeRay, Nodes, OutlineSide, PolarFrame, PupilLimit,
+    PupilMoments, PupilOutline, PupilRadius, Region, RegionKind, TracedNodes, TracedPupil,
+    converge, converge_every_order, converge_list, converge_resolved,
 };
 pub use stop_limited::limited_by_stop;

@@ -654,3 +654,60 @@ fn pupils_that_are_followed_step_by_step_are_those_of_the_lens() {
     }
     assert!(forms.windows(2).any(|pair| pair[0] != pair[1]));
 }
+
+/// On the axis one rim ends the light. Where another rim is as narrow, the area of the pupil has a kink,
+/// and the shortfall of light has none: each of the rims has its own.
+#[test]
+fn light_on_the_axis_has_no_kink_where_two_rims_are_equally_narrow() {
+    let mut lens = bundled("tessar_50_f28");
+    lens.fields.values.truncate(1);
+    assert_eq!((lens.fields.values[0].x, lens.fields.values[0].y), (0.0, 0.0));
+    lens.wavelengths.retain(|wavelength| wavelength.primary);
+    let light = |lens: &Lens| {
+        Merit::new(lens, &goal_of(Term::Light(1.0)), 1e-4).unwrap().spot_samplings()[0].area
+    };
+    let stop = lens.stop().unwrap();
+    let at_stop = light(&lens);
+    // The rim of the first surface takes as much as the stop.
+    let full = lens.surfaces[0].semi_diameter.unwrap();
+    let (mut low, mut high) = (0.3 * full, full);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        lens.surfaces[0].semi_diameter = Some(middle);
+        if light(&lens) < at_stop * (1.0 - 1e-12) { low = middle } else { high = middle }
+    }
+    lens.surfaces[0].semi_diameter = Some(high);
+    lens.variables.clear();
+    for surface in [0, stop] {
+        vary(&mut lens, surface, Quantity::SemiDiameter);
+    }
+    let merit = Merit::new(&lens, &goal_of(Term::Light(1.0)), 1e-4).unwrap();
+    let values = merit.values(&lens);
+    let at = |change: [f64; 2]| {
+        let there = [values[0] + change[0], values[1] + change[1]];
+        merit.evaluate(&there, DerivativeLevel::Normal).unwrap()
+    };
+    let h = 1e-3;
+    for (i, sides) in [[[h, 0.0], [-h, 0.0]], [[0.0, h], [0.0, -h]]].iter().enumerate() {
+        let [wide, narrow] = sides.map(at);
+        assert!(wide.value < 1e-12, "{}", wide.value);
+        // From the kept side the narrow one is known beforehand.
+        let base = at([0.0; 2]);
+        let mut change = nalgebra::DVector::zeros(2);
+        change[i] = -h;
+        let promised: f64 = base
+            .separate
+            .iter()
+            .map(|residual| (residual.value + residual.slope.dot(&change)).max(0.0).powi(2))
+            .sum();
+        assert!((promised / narrow.value - 1.0).abs() < 1e-3, "{promised} {}", narrow.value);
+    }
+    // Both narrow: the sum of both, with its derivatives.
+    let both = at([-2.0 * h, -h]);
+    let [first, second] = [at([-2.0 * h, 0.0]), at([0.0, -h])];
+    assert!((both.value / (first.value + second.value) - 1.0).abs() < 1e-9);
+    let gradient = &first.gradient + &second.gradient;
+    assert!((&both.gradient - &gradient).norm() < 1e-8 * gradient.norm());
+    let only_value = merit.value(&[values[0] - 2.0 * h, values[1] - h]).unwrap();
+    assert!((only_value / both.value - 1.0).abs() < 1e-12);
+}

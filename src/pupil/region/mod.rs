@@ -5,6 +5,7 @@
 //! nodes, an outline to draw, traced rays with their moments, and how far a dark pupil is from light.
 
 mod annulus;
+mod axial_rims;
 mod boundary;
 mod boundary_tracking;
 mod dark_points;
@@ -25,6 +26,7 @@ mod traced_pupil;
 mod whole_turn;
 
 pub use annulus::Annulus;
+pub use axial_rims::AxialRim;
 pub use boundary::{Boundary, BoundaryArc, EdgePoint, PolarFrame, PupilLimit};
 pub use dark_pupil::DarkPupil;
 pub use edge_curve::{EdgeArc, EdgeCurves};
