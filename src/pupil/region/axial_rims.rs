@@ -38,14 +38,15 @@ impl TracedPupil<'_> {
         if !self.region.launch.is_axial() {
             return None;
         }
-        let RegionKind::StarShaped(boundary) = &self.region.kind else {
-            return (self.region.kind == RegionKind::Clear).then_some((None, 1.0));
-        };
-        let (arc, radius) = (boundary.arcs.first()?, self.radial_lines.first()?.edge.radius);
-        match arc.limit {
-            PupilLimit::Surface(surface, RayLimit::Rim) if boundary.arcs.len() == 1 => {
-                Some((Some(surface), radius))
-            }
+        match self.region.kind {
+            RegionKind::Clear => return Some((None, 1.0)),
+            RegionKind::StarShaped(_) => {}
+            _ => return None,
+        }
+        // The arcs of a form that was followed here may be those of another rim.
+        let edge = self.radial_lines.first()?.edge;
+        match edge.limit {
+            PupilLimit::Surface(surface, RayLimit::Rim) => Some((Some(surface), edge.radius)),
             _ => None,
         }
     }
