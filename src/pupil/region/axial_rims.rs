@@ -4,7 +4,8 @@
 //! least of those that the rims would leave one by one, and has a kink where another rim becomes the
 //! narrowest one. The areas of the single rims have none.
 
-use super::boundary::PupilLimit;
+use super::boundary::{PolarFrame, PupilLimit};
+use super::edge_search::EdgeSearch;
 use super::kind::RegionKind;
 use super::traced_pupil::TracedPupil;
 use crate::trace::{Ray, RayLimit, Rays, SystemGradient};
@@ -23,13 +24,6 @@ pub struct AxialRim {
     by_margin: f64,
 }
 
-/// The part of the radius of the pupil between the two first rays of a search.
-const FIRST_STEP: f64 = 1e-3;
-/// The secant steps of a search.
-const SECANT_STEPS: usize = 12;
-/// The distance of a ray from a rim, relative to that, at which a search ends.
-const AT_RIM: f64 = 1e-13;
-
 impl TracedPupil<'_> {
     /// The surface whose rim alone ends the pupil, and the radius of the pupil in its own coordinates;
     /// `None` for the surface if that is the disc of the pupil. `None` for a pupil that is not on the
@@ -38,15 +32,16 @@ impl TracedPupil<'_> {
         if !self.region.launch.is_axial() {
             return None;
         }
-        match self.region.kind {
+        let frame = match &self.region.kind {
             RegionKind::Clear => return Some((None, 1.0)),
-            RegionKind::StarShaped(_) => {}
+            RegionKind::StarShaped(boundary) => boundary.frame,
             _ => return None,
-        }
+        };
         // The arcs of a form that was followed here may be those of another rim.
-        let edge = self.radial_lines.first()?.edge;
-        match edge.limit {
-            PupilLimit::Surface(surface, RayLimit::Rim) => Some((Some(surface), edge.radius)),
+        let line = self.radial_lines.first()?;
+        let [x, y] = frame.point(line.azimuth, line.edge.radius);
+        match line.edge.limit {
+            PupilLimit::Surface(surface, RayLimit::Rim) => Some((Some(surface), x.hypot(y))),
             _ => None,
         }
     }
@@ -60,43 +55,18 @@ impl TracedPupil<'_> {
     /// the axis, or if something else than a rim ends it.
     pub fn other_axial_rims(&self, most: f64) -> Vec<AxialRim> {
         let Some((limiting, radius)) = self.axial_edge() else { return Vec::new() };
-        let channel = self.region.launch.channel();
-        let reach = (most / (PI * self.region.launch.area())).sqrt();
+        let launch = &self.region.launch;
+        let surfaces = &launch.channel().system.surfaces;
+        let reach = (most / (PI * launch.area())).sqrt();
+        let mut search = EdgeSearch::new(launch, PolarFrame::UNIT);
+        let others = (0..surfaces.len())
+            .filter(|i| Some(*i) != limiting && surfaces[*i].semi_diameter.is_finite());
         let rim = |surface: usize| {
-            let semi_diameter = channel.system.surfaces[surface].semi_diameter;
-            let has_rim = semi_diameter.is_finite();
-            let found =
-                has_rim.then(|| self.radius_by_rim(surface, semi_diameter, radius, reach))??;
-            self.pupil_of_rim(surface, found)
+            let limit = PupilLimit::Surface(surface, RayLimit::Rim);
+            let found = search.limit_zero(limit, 0.0, radius)?;
+            if found <= reach { self.pupil_of_rim(surface, found) } else { None }
         };
-        let others = (0..channel.system.surfaces.len()).filter(|i| Some(*i) != limiting);
         others.filter_map(rim).collect()
-    }
-
-    /// The radius, up to `reach` in pupil coordinates, of the ray that passes a rim; by the secant method
-    /// on the height at the surface, which is almost in proportion to the radius.
-    fn radius_by_rim(&self, surface: usize, rim: f64, from: f64, reach: f64) -> Option<f64> {
-        let excess = |radius: f64| {
-            let ray = self.region.launch.ray([0.0, radius])?;
-            let margin = self.region.launch.channel().tracer.margin(ray, surface, RayLimit::Rim)?;
-            Some((rim * rim - margin).max(0.0).sqrt() - rim)
-        };
-        let mut last = (from * (1.0 - FIRST_STEP), excess(from * (1.0 - FIRST_STEP))?);
-        let mut radius = from;
-        for _ in 0..SECANT_STEPS {
-            let over = excess(radius)?;
-            if over.abs() <= AT_RIM * rim {
-                return Some(radius);
-            }
-            let slope = (over - last.1) / (radius - last.0);
-            last = (radius, over);
-            radius -= over / slope;
-            // Not so near that it could end the light soon.
-            if !(radius > 0.0 && radius <= reach) {
-                return None;
-            }
-        }
-        None
     }
 
     fn pupil_of_rim(&self, surface: usize, radius: f64) -> Option<AxialRim> {
