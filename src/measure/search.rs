@@ -49,7 +49,7 @@ pub enum SearchContender {
     /// Basin hopping (Wales, Doye, J. Phys. Chem. A 101, 5111, 1997) that accepts improvements alone: all
     /// variables are displaced at random, and a descent follows. The structure stays.
     BasinHopping,
-    /// An iterated local search with one mutant at a time, which does not race.
+    /// An iterated local search with one mutant at a time, which does not race, and no displacements.
     SingleTrial,
     /// A descent from the start without mutations, the same for every seed.
     Descent,
@@ -77,10 +77,11 @@ impl SearchContender {
             Self::BasinHopping | Self::SingleTrial => {
                 plan.settings.method = SearchMethod::IteratedLocalSearch;
                 plan.settings.trials = 1;
-                if self == Self::BasinHopping {
-                    let weight = |kind| f64::from(u8::from(kind == MutationKind::Displacement));
-                    plan.rules.weights =
-                        MutationKind::PERTURBATIONS.map(|kind| (kind, weight(kind))).to_vec();
+                let is_excluded = |kind: &MutationKind| {
+                    (*kind == MutationKind::Displacement) == (self == Self::SingleTrial)
+                };
+                for kind in MutationKind::PERTURBATIONS.into_iter().filter(is_excluded) {
+                    plan.rules.exclude(kind);
                 }
             }
             Self::Descent => plan.settings = plan.settings.without_mutations(),

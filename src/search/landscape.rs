@@ -68,6 +68,12 @@ pub trait Landscape: Sync {
         self.mutate(point, weights, random)
     }
 
+    /// The relative frequency of a kind of perturbation by the landscape's own rules, 0 if there is none; by
+    /// default points are mutated and not displaced.
+    fn weight(&self, kind: MutationKind) -> f64 {
+        f64::from(u8::from(kind != MutationKind::Displacement))
+    }
+
     /// The topology of a point, the same for all points of one structure: a reservoir may hold one
     /// of each.
     fn topology(&self, point: &Self::Point) -> String;

@@ -126,14 +126,19 @@ impl SearchRules {
     }
 
     /// The relative frequency of a kind of mutation; 0 for those about aspheric surfaces where none is
-    /// permitted, and for displacements unless they are listed.
+    /// permitted.
     pub fn weight(&self, kind: MutationKind) -> f64 {
         if kind.is_about_aspheres() && self.aspheres == 0 {
             return 0.0;
         }
         let listed = self.weights.iter().find(|(listed, _)| *listed == kind);
-        let usual = if kind == MutationKind::Displacement { 0.0 } else { 1.0 };
-        listed.map_or(usual, |(_, weight)| *weight)
+        listed.map_or(1.0, |(_, weight)| *weight)
+    }
+
+    /// Gives a kind of mutation the weight 0.
+    pub fn exclude(&mut self, kind: MutationKind) {
+        self.weights.retain(|(listed, _)| *listed != kind);
+        self.weights.push((kind, 0.0));
     }
 
     /// The same rules restricted to mutations of the surfaces `first` to `last` of a lens with

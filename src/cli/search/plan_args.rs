@@ -276,8 +276,7 @@ impl SearchPlanArgs {
         rules.back_focus = room.or(rules.back_focus);
         rules.projection &= !self.no_projection;
         for MutationArg(kind) in &self.forbid {
-            rules.weights.retain(|(other, _)| other != kind);
-            rules.weights.push((*kind, 0.0));
+            rules.exclude(*kind);
         }
         Ok(rules)
     }

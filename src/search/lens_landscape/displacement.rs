@@ -85,11 +85,9 @@ mod tests {
         }
     }
 
-    /// A displacement is no mutation of RESTORE, and of an iterated search only if it is listed.
     #[test]
-    fn displacements_are_drawn_where_they_are_asked_for() {
-        let (rules, listed) = (SearchPlan::default().rules, landscape());
-        assert_eq!(rules.weight(MutationKind::Displacement), 0.0);
+    fn a_displacement_is_no_mutation_of_restore() {
+        let listed = landscape();
         let weights = MutationWeights::default();
         let drawn = listed.mutate(listed.start(), &weights, &mut Random::seed_from_u64(1));
         assert_eq!(drawn.unwrap_err().refusal, Refusal::AllExcluded);

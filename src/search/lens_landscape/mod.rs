@@ -381,6 +381,10 @@ impl Landscape for LensLandscape {
         }
     }
 
+    fn weight(&self, kind: MutationKind) -> f64 {
+        self.rules.weight(kind)
+    }
+
     fn topology(&self, lens: &Arc<Lens>) -> String {
         let glass = element::topology(lens);
         match self.priced_aspheres(lens) {

@@ -29,7 +29,7 @@ pub enum MutationKind {
     AddAsphere,
     /// Makes an aspheric surface spherical.
     RemoveAsphere,
-    /// Displaces all variables at random: a perturbation of an iterated local search, if it has a weight.
+    /// Displaces all variables at random: a perturbation of an iterated local search.
     Displacement,
     /// Draws a random lens.
     Global,

@@ -4,7 +4,7 @@ use super::SearchRun;
 use super::chain::{
     Chain, ChainDescent, LocalMove, NewDescent, RoundContext, TurnEvent, TurnEvents, end_descent,
 };
-use super::race::{Race, RaceStage};
+use super::race::{Perturbation, Race, RaceStage};
 use crate::search::{
     DescentEnd, Landscape, MutationError, MutationKind, Random, Refusal, ReservoirEntry,
     SearchEvent, SearchPoint,
@@ -86,26 +86,56 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         let Some(race) = &self.race else { return vec![true; self.chains.len()] };
         let is_active = |i: usize| match race.stage {
             RaceStage::Best => i == 0,
-            RaceStage::Trials(0) => i > 0,
+            RaceStage::Trials(0) => (1..=self.trial_count(race.perturbation)).contains(&i),
             RaceStage::Trials(_) => i > 0 && self.chains[i].descent.is_some(),
             RaceStage::Challenger(chain) => i == chain,
         };
         all.map(is_active).collect()
     }
 
-    /// The points that are mutated in the next round, the best one first: the pinned one alone, or the
-    /// best one, the best ones of other structures, and another minimum of its own.
+    /// The number of trials of a race.
+    fn trial_count(&self, perturbation: Perturbation) -> usize {
+        match perturbation {
+            Perturbation::Mutants => self.settings.trials,
+            Perturbation::SingleMutant | Perturbation::Displacement => 1,
+        }
+    }
+
+    /// What the next race begins with: whatever has gained most by gradient, of the perturbations that the
+    /// landscape has. No displacement leads from a structure that is not permitted to one that is.
+    fn next_perturbation<L>(&self, race: &Race, landscape: &L) -> Perturbation
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        let is_drawn = |kind: &MutationKind| landscape.weight(*kind) * self.weights.of(*kind) > 0.0;
+        let best = self.chains[0].best();
+        let is_outside = best.is_some_and(|(point, _)| landscape.structure_violation(point) > 0);
+        let is_possible = |perturbation: &Perturbation| {
+            let mut kinds = MutationKind::PERTURBATIONS.into_iter();
+            kinds.any(|kind| perturbation.includes(kind) && is_drawn(&kind))
+                && !(is_outside && *perturbation == Perturbation::Displacement)
+        };
+        let possible = Perturbation::ALL.into_iter().filter(is_possible);
+        let fastest = possible.reduce(|a, b| if race.rate(b) > race.rate(a) { b } else { a });
+        fastest.unwrap_or_default()
+    }
+
+    /// The points that are mutated in the next round, the best one first: the pinned one alone, the best
+    /// one alone where it is displaced, or the best one, the best ones of other structures, and another
+    /// minimum of its own.
     pub(super) fn parents<L>(&self, landscape: &L) -> Vec<ReservoirEntry<P>>
     where
         L: Landscape<Point = P, Memory = M>,
     {
-        if self.race.as_ref().is_none_or(|race| race.stage != RaceStage::Trials(0)) {
-            return Vec::new();
-        }
+        let at_start = |race: &&Race| race.stage == RaceStage::Trials(0);
+        let Some(race) = self.race.as_ref().filter(at_start) else { return Vec::new() };
         if let Some(pinned) = &self.pinned {
             return vec![pinned.clone()];
         }
         let Some(best) = self.entry_of(0, landscape) else { return Vec::new() };
+        if race.perturbation == Perturbation::Displacement {
+            return vec![best];
+        }
         let mut entries = self.reservoir.entries().to_vec();
         entries.sort_by(ReservoirEntry::rank);
         let mut parents = vec![best];
@@ -171,7 +201,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             if let Some(descent) = &self.chains[0].descent {
                 race.settle(descent.best_loss, descent.gradients);
             }
-            race.stage = RaceStage::Trials(0);
+            self.begin_race(race, landscape);
         }
     }
 
@@ -192,7 +222,15 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         let ended = (is_lost || is_outside).then_some(0.0);
         let Some(rate) = ended.or_else(|| race.measured(gradients, loss)) else { return false };
         race.best_rate = rate;
-        rate <= self.required_rate(race)
+        rate <= self.required_rate(race, landscape)
+    }
+
+    fn begin_race<L>(&self, race: &mut Race, landscape: &L)
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        race.perturbation = self.next_perturbation(race, landscape);
+        race.stage = RaceStage::Trials(0);
     }
 
     /// Moves the best point of the descent of a chain to one that keeps every limit, and the descent with
@@ -213,13 +251,17 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         is_kept
     }
 
-    /// The rate below which the descent of the best point pauses: that of races, or 0 once there are
-    /// too few gradients for one more.
-    fn required_rate(&self, race: &Race) -> f64 {
+    /// The rate below which the descent of the best point pauses: that of the next race, or 0 once there are
+    /// too few gradients for it.
+    fn required_rate<L>(&self, race: &Race, landscape: &L) -> f64
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        let next = self.next_perturbation(race, landscape);
         let done = self.statistics.gradients;
         let left = self.settings.gradients.map(|limit| limit.saturating_sub(done));
-        let needed = TRIAL_GRADIENTS * self.settings.trials as u64;
-        if left.is_some_and(|left| left < needed) { 0.0 } else { race.rate() }
+        let needed = TRIAL_GRADIENTS * self.trial_count(next) as u64;
+        if left.is_some_and(|left| left < needed) { 0.0 } else { race.required_rate(next) }
     }
 
     /// The consecutive rounds without progress, after one more that made some or none. Those of the best
@@ -262,7 +304,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             }
         }
         match entries[..] {
-            [] => self.end_race(race),
+            [] => self.end_race(race, landscape),
             [(chain, _)] => {
                 race.stage = RaceStage::Challenger(chain);
                 if let Some(descent) = &self.chains[chain].descent {
@@ -288,7 +330,9 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             return;
         }
         let best = self.chains[0].best().map_or(f64::INFINITY, |(_, loss)| loss);
-        let Some(descent) = &self.chains[chain].descent else { return self.end_race(race) };
+        let Some(descent) = &self.chains[chain].descent else {
+            return self.end_race(race, landscape);
+        };
         let (gradients, loss) = (descent.gradients, descent.best_loss);
         let mut end = DescentEnd::InfiniteLoss;
         if descent.loss.is_finite() {
@@ -300,7 +344,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             end = DescentEnd::Unpromising;
         }
         self.end_trial(race, chain, end, landscape, events);
-        self.end_race(race);
+        self.end_race(race, landscape);
     }
 
     /// Makes the challenger the best point if it is better; true if it is.
@@ -365,10 +409,21 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     }
 
     /// Ends a race without a winner.
-    fn end_race(&self, race: &mut Race) {
-        let required = if race.is_empty() { 0.0 } else { self.required_rate(race) };
+    fn end_race<L>(&self, race: &mut Race, landscape: &L)
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        let required = if race.is_empty() { 0.0 } else { self.required_rate(race, landscape) };
+        if race.is_empty() {
+            // Where no trial can begin, the other perturbation comes next.
+            race.count(TRIAL_GRADIENTS);
+        }
         race.settle(0.0, 0);
-        race.stage = if race.best_rate > required { RaceStage::Best } else { RaceStage::Trials(0) };
+        if race.best_rate > required {
+            race.stage = RaceStage::Best;
+        } else {
+            self.begin_race(race, landscape);
+        }
     }
 
     fn end_trial<L>(

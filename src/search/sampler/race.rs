@@ -4,10 +4,14 @@
 //!
 //! Chain 0 holds the best point and its descent, which pauses while the other chains run trials: each
 //! descends from a mutation. After every stage the worse ones end; the last one goes on as the
-//! challenger while it may still overtake the best point, and then takes its place. A descent goes on
-//! for as long as it gains faster than races do on average: this maximizes the gain for a budget
-//! (Charnov, "Optimal Foraging, the Marginal Value Theorem", 1976). Kinds of mutation are drawn in
-//! proportion to their gain by gradient so far.
+//! challenger while it may still overtake the best point, and then takes its place. In place of several
+//! mutants there may be a single one, or a displacement of the best point as in basin hopping: the challenger
+//! from the start.
+//!
+//! Whatever gains fastest comes next: a descent goes on for as long as it gains faster than trials do on
+//! average, and of the ways to make trials that with the largest gain by gradient so far follows it. This
+//! maximizes the gain for a budget (Charnov, "Optimal Foraging, the Marginal Value Theorem", 1976). Kinds of
+//! mutation are drawn in proportion to their gain by gradient.
 
 use crate::search::{MutationKind, MutationWeights};
 use serde::{Deserialize, Serialize};
@@ -88,6 +92,28 @@ struct DescentRate {
     loss: f64,
 }
 
+/// What the trials of a race begin with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(super) enum Perturbation {
+    /// Each with a mutation of one of the parents.
+    #[default]
+    Mutants,
+    /// A single trial with a mutation of one of the parents.
+    SingleMutant,
+    /// A single trial with a displacement of the best point.
+    Displacement,
+}
+
+impl Perturbation {
+    pub(super) const ALL: [Self; 3] = [Self::Mutants, Self::SingleMutant, Self::Displacement];
+
+    /// True for the kinds that it draws from.
+    pub(super) fn includes(self, kind: MutationKind) -> bool {
+        (kind == MutationKind::Displacement) == (self == Self::Displacement)
+    }
+}
+
 /// The state of an iterated local search besides its chains.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in crate::search) struct Race {
@@ -99,7 +125,12 @@ pub(in crate::search) struct Race {
     winner: Option<(MutationKind, f64)>,
     /// The gradients of the race so far.
     gradients: u64,
-    rate: GainRate,
+    /// What the trials of the race begin with.
+    #[serde(default)]
+    pub(super) perturbation: Perturbation,
+    /// The gain by gradient of the races that began with a perturbation.
+    #[serde(default)]
+    rates: BTreeMap<Perturbation, GainRate>,
     kinds: BTreeMap<MutationKind, GainRate>,
     /// True if no point near the best one keeps every limit.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -115,7 +146,8 @@ impl Race {
             best_rate: 0.0,
             winner: None,
             gradients: 0,
-            rate: GainRate::expected(EXPECTATION_GRADIENTS),
+            perturbation: Perturbation::default(),
+            rates: BTreeMap::new(),
             kinds: BTreeMap::new(),
             breaks_limits: false,
         }
@@ -136,9 +168,15 @@ impl Race {
         self.measure_from(0, loss);
     }
 
-    /// The rate of races so far, and the least one that a descent needs to go on.
-    pub(super) fn rate(&self) -> f64 {
-        self.rate.value().max(LEAST_RATE)
+    /// The gain by gradient of races with such a perturbation so far.
+    pub(super) fn rate(&self, perturbation: Perturbation) -> f64 {
+        let expected = GainRate::expected(EXPECTATION_GRADIENTS);
+        self.rates.get(&perturbation).copied().unwrap_or(expected).value()
+    }
+
+    /// The rate that a descent needs to go on where the next race begins with such a perturbation.
+    pub(super) fn required_rate(&self, next: Perturbation) -> f64 {
+        self.rate(next).max(LEAST_RATE)
     }
 
     /// Counts gradients of the race; the descent of the best point belongs to the race that it has won.
@@ -198,7 +236,9 @@ impl Race {
             self.of_kind(kind).add(gain, gradients as f64);
         }
         if self.gradients > 0 {
-            self.rate.add(gain, self.gradients as f64);
+            let expected = GainRate::expected(EXPECTATION_GRADIENTS);
+            let rate = self.rates.entry(self.perturbation).or_insert(expected);
+            rate.add(gain, self.gradients as f64);
         }
         self.gradients = 0;
     }
@@ -207,16 +247,64 @@ impl Race {
         self.kinds.entry(kind).or_insert_with(|| GainRate::expected(KIND_EXPECTATION_GRADIENTS))
     }
 
-    /// Weights of the kinds of mutation in proportion to their rates, multiplied by those of the user.
+    /// Weights of the kinds that the present race draws from, in proportion to their rates and multiplied by
+    /// those of the user; 0 for the other ones.
     pub(super) fn weights(&self, user: &MutationWeights) -> MutationWeights {
         let expected = GainRate::expected(KIND_EXPECTATION_GRADIENTS);
         let rate = |kind| self.kinds.get(&kind).copied().unwrap_or(expected).value();
-        let largest = MutationKind::PERTURBATIONS.into_iter().map(rate).fold(0.0, f64::max);
+        let is_drawn = |kind: &MutationKind| self.perturbation.includes(*kind);
+        let drawn = MutationKind::PERTURBATIONS.into_iter().filter(is_drawn);
+        let largest = drawn.map(rate).fold(0.0, f64::max);
         let mut weights = user.clone();
         for kind in MutationKind::PERTURBATIONS {
             let share = (rate(kind) / largest).max(LEAST_SHARE);
-            weights.set(kind, share * user.of(kind));
+            weights.set(kind, if is_drawn(&kind) { share * user.of(kind) } else { 0.0 });
         }
         weights
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ends a race that has taken these gradients with a winner of this loss, the loss before being 1.
+    fn settle(race: &mut Race, perturbation: Perturbation, gradients: u64, loss: f64) {
+        race.stage = RaceStage::Trials(1);
+        race.perturbation = perturbation;
+        race.count(gradients);
+        race.note_winner(Some(MutationKind::Bend), 1.0);
+        race.settle(loss, gradients);
+    }
+
+    #[test]
+    fn the_rate_of_a_perturbation_follows_its_own_races() {
+        let mut race = Race::new(1.0);
+        let [mutants, single, displaced] = Perturbation::ALL;
+        settle(&mut race, displaced, 300, 1.0);
+        assert!(race.rate(displaced) < race.rate(single));
+        assert_eq!(race.rate(single), race.rate(mutants));
+        settle(&mut race, mutants, 300, 0.5);
+        assert!(race.rate(mutants) > 2.0 * race.rate(single));
+        for _ in 0..40 {
+            settle(&mut race, mutants, 300, 1.0);
+        }
+        assert!(race.rate(mutants) < race.rate(displaced));
+        assert!(race.required_rate(mutants) >= LEAST_RATE);
+    }
+
+    #[test]
+    fn a_race_draws_from_the_kinds_of_its_perturbation() {
+        let mut race = Race::new(1.0);
+        let mut user = MutationWeights::default();
+        user.set(MutationKind::Flip, 0.0);
+        for perturbation in Perturbation::ALL {
+            race.perturbation = perturbation;
+            let weights = race.weights(&user);
+            for kind in MutationKind::PERTURBATIONS {
+                let is_drawn = perturbation.includes(kind) && kind != MutationKind::Flip;
+                assert_eq!(weights.of(kind) > 0.0, is_drawn, "{perturbation:?} {kind:?}");
+            }
+        }
     }
 }

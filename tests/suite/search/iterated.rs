@@ -101,7 +101,8 @@ fn results_do_not_depend_on_threads_and_depend_on_the_seed() {
 fn a_run_resumes_bit_for_bit_in_the_middle_of_a_race() {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("search").join("iterated");
     std::fs::create_dir_all(&folder).unwrap();
-    let (path, landscape) = (folder.join("run.json"), Rugged::default());
+    let landscape = Rugged { displaces: true, ..Rugged::default() };
+    let path = folder.join("run.json");
     let settings = SearchSettings { gradients: Some(1500), ..settings(METHOD) };
     let (whole, _) = to_the_end(&landscape, &settings);
     let mut run = begin(&landscape, &settings);
@@ -114,6 +115,32 @@ fn a_run_resumes_bit_for_bit_in_the_middle_of_a_race() {
     let other = SearchSettings { trials: 4, ..settings };
     let refused = SearchRun::<_, super::rugged::Momentum>::load(&landscape, &other, &path);
     assert!(refused.unwrap_err().to_string().contains("settings.trials"));
+}
+
+/// Some races have several mutants, some one, and some one displacement of the best point.
+#[test]
+fn the_best_point_is_displaced_where_the_landscape_permits_it() {
+    let landscape = Rugged { displaces: true, ..Rugged::default() };
+    let mut run = begin(&landscape, &settings(METHOD));
+    let (mut displaced, mut single) = (0, 0);
+    while run.end_reason().is_none() {
+        let best = run.chains()[0].generation();
+        let before = run.lineage().total();
+        run.round(&landscape);
+        let nodes = run.lineage().nodes();
+        let born: Vec<_> = nodes.iter().filter(|node| node.number >= before).collect();
+        let kinds: Vec<_> = born.iter().map(|node| node.kind).collect();
+        if kinds.contains(&Some(MutationKind::Displacement)) {
+            assert!(kinds.len() == 1 && born[0].parent == Some(best), "{born:?}");
+            displaced += 1;
+        } else if kinds.len() == 1 {
+            single += 1;
+        }
+    }
+    assert!(displaced > 3 && single > 3, "{displaced} {single}");
+    assert!(run.best().point.elements == 6 && run.best().loss < 0.06, "{:?}", run.best());
+    let kinds = &run.statistics().kinds;
+    assert!(kinds[&MutationKind::AddSinglet].tried > displaced);
 }
 
 #[test]

@@ -46,6 +46,8 @@ pub(super) enum Fault {
 #[derive(Debug, Clone, Default, Serialize)]
 pub(super) struct Rugged {
     pub(super) fault: Fault,
+    /// True if points may be displaced within their structure.
+    pub(super) displaces: bool,
 }
 
 pub(super) const START: Spot = Spot { elements: 2, x: 3.0 };
@@ -53,7 +55,7 @@ pub(super) const STEPS: usize = 5;
 
 impl Rugged {
     pub(super) fn with(fault: Fault) -> Self {
-        Self { fault }
+        Self { fault, ..Self::default() }
     }
 
     fn sound(spot: &Spot) -> f64 {
@@ -74,7 +76,7 @@ impl Rugged {
         let elements = match kind {
             MutationKind::AddSinglet if spot.elements < 8 => spot.elements + 1,
             MutationKind::RemoveSinglet if spot.elements > 1 => spot.elements - 1,
-            MutationKind::Bend => spot.elements,
+            MutationKind::Bend | MutationKind::Displacement => spot.elements,
             _ => return Err(MutationError::new(kind, Refusal::TooManyElements)),
         };
         if self.fault == Fault::AllRefused {
@@ -139,16 +141,26 @@ impl Landscape for Rugged {
         weights: &MutationWeights,
         random: &mut Random,
     ) -> Result<MutatedPoint<Spot>, MutationError> {
-        let kinds = [MutationKind::AddSinglet, MutationKind::RemoveSinglet, MutationKind::Bend];
-        let sum: f64 = kinds.iter().map(|kind| weights.of(*kind)).sum();
+        let kinds = [
+            MutationKind::AddSinglet,
+            MutationKind::RemoveSinglet,
+            MutationKind::Bend,
+            MutationKind::Displacement,
+        ];
+        let weight = |kind| self.weight(kind) * weights.of(kind);
+        let sum: f64 = kinds.into_iter().map(weight).sum();
         let mut left = random.random::<f64>() * sum;
         let drawn = kinds.into_iter().find(|kind| {
-            left -= weights.of(*kind);
+            left -= weight(*kind);
             left < 0.0
         });
         let noise = random.sample::<f64, _>(StandardNormal);
         let forbidden = MutationError::new(MutationKind::Bend, Refusal::AllExcluded);
         self.mutated(spot, drawn.ok_or(forbidden)?, noise)
+    }
+
+    fn weight(&self, kind: MutationKind) -> f64 {
+        f64::from(u8::from(self.displaces || kind != MutationKind::Displacement))
     }
 
     fn topology(&self, spot: &Spot) -> String {

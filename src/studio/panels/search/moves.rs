@@ -33,7 +33,7 @@ pub(super) fn table(ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions)
                 }
             }
             ui.end_row();
-            // Displacements are made where the rules list them, and are no row of other runs.
+            // Displacements are made in iterated searches, and are no row of other runs.
             let is_made = |kind: &MutationKind| {
                 *kind != MutationKind::Displacement
                     || search.run.statistics.kinds.contains_key(kind)

@@ -256,7 +256,7 @@ impl SearchSetup {
         let weights = &mut self.request.plan.rules.weights;
         ui.collapsing("Weights of the mutations", |ui| {
             Grid::new("weights").num_columns(4).spacing([8.0, 3.0]).show(ui, |ui| {
-                for (i, kind) in MutationKind::MUTATIONS.into_iter().enumerate() {
+                for (i, kind) in MutationKind::PERTURBATIONS.into_iter().enumerate() {
                     weight_field(ui, weights, kind);
                     (i % 2 == 1).then(|| ui.end_row());
                 }
