@@ -17,7 +17,9 @@ mod trust_region;
 pub use exchanging::start_exchanging;
 pub(crate) use glasses::hold_powers;
 pub use glasses::{GlassExchange, GlassRound, GlassSearch, GlassSearchError};
-pub use segment::{DescentState, SegmentResult, SegmentSettings, run_segment};
+pub use segment::{
+    DescentState, LimitedSegment, SegmentResult, SegmentSettings, run_limited_segment, run_segment,
+};
 
 use crate::lens::Lens;
 use crate::merit::{ConstraintMargin, Goal, Merit, MeritError, TermValue};

@@ -2,13 +2,14 @@
 //! [`DescentState`], so that a search can be saved between two segments and resumed with identical
 //! results.
 
-use super::DescentMethod;
 use super::least_squares::LeastSquaresOptimizer;
+use super::limited::LimitedOptimizer;
 use super::state::OptimizerState;
 use super::trust_region::TrustRegionOptimizer;
+use super::{DescentMethod, Optimizer as _};
 use crate::lens::Lens;
 use crate::merit::{DerivativeLevel, Merit, MeritError};
-use crate::solve::{AdamMoments, NielsenDamping, TrustRegionMemory};
+use crate::solve::{AdamMoments, LimitedTrustRegionMemory, NielsenDamping, TrustRegionMemory};
 use serde::{Deserialize, Serialize};
 
 /// The settings of a segment of a descent.
@@ -23,6 +24,15 @@ pub struct SegmentSettings {
     pub rate: f64,
 }
 
+/// The settings of a segment that keeps the limits of its goal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LimitedSegment {
+    /// The number of evaluations with derivatives that are never exceeded.
+    pub evaluations: usize,
+    /// The relative tolerance of the spots.
+    pub tolerance: f64,
+}
+
 /// The state of a descent between two segments; the default starts a new descent.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -35,6 +45,15 @@ pub struct DescentState {
     /// The trust region.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     region: Option<TrustRegionMemory>,
+    /// The trust region of segments that keep the limits.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    limited_region: Option<LimitedTrustRegionMemory>,
+    /// True if the next segment keeps the limits of the goal.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub keeps_limits: bool,
+    /// The number of segments that kept the limits and gained nothing.
+    #[serde(default)]
+    pub failures_with_limits: usize,
     /// The number of steps so far.
     pub steps: usize,
 }
@@ -51,6 +70,8 @@ pub struct SegmentResult {
     pub gradients: usize,
 }
 
+/// The evaluations of a segment that are left for corrections at its end.
+const CORRECTIONS: usize = 8;
 /// The minimum rate, relative to the initial one.
 const MIN_RATE: f64 = 0.02;
 /// The maximum rate, relative to the initial one, and its growth after a successful segment.
@@ -77,6 +98,7 @@ impl DescentState {
         self.pace = Some((0.5 * self.pace.unwrap_or(1.0)).max(MIN_RATE));
         self.moments = AdamMoments::default();
         self.region.iter_mut().for_each(|region| region.shrink(REGION_DECAY));
+        self.limited_region.iter_mut().for_each(|region| region.shrink(REGION_DECAY));
     }
 }
 
@@ -118,6 +140,35 @@ pub fn run_segment(
         initial_merit: before,
         gradients: (state.evaluations - 1).max(1),
     })
+}
+
+/// The segment of a descent that keeps the limits of its goal: steps, and corrections after which the lens
+/// at its end keeps every limit if one near it does.
+///
+/// # Errors
+/// A lens without variables or without a merit; limits that contradict one another.
+pub fn run_limited_segment(
+    merit: Merit,
+    lens: &Lens,
+    asked: LimitedSegment,
+    memory: &mut DescentState,
+) -> Result<SegmentResult, MeritError> {
+    let search = LimitedOptimizer::new(merit, lens, asked.tolerance)?;
+    let initial_merit = search.objective();
+    let most = asked.evaluations;
+    let mut search = search.into_segment(most, memory.limited_region.as_ref());
+    memory.steps += most;
+    // Steps that need no evaluation come to an end too.
+    for _ in 0..most {
+        if search.evaluations_left() <= CORRECTIONS || search.step().finished {
+            break;
+        }
+    }
+    memory.limited_region = search.memory();
+    search.verify_best();
+    let state = search.into_state();
+    let gradients = (state.evaluations - 1).max(1);
+    Ok(SegmentResult { lens: state.best, initial_merit, gradients })
 }
 
 fn adam(

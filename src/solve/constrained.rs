@@ -7,13 +7,14 @@
 //! approximates the second derivatives of the Lagrangian that `JᵀJ` leaves out. A step is accepted
 //! if it lowers the sum plus the violations at their prices.
 
-use super::kink::{KinkBranches, KinkTrial};
+use super::kink::{BranchMemory, KinkBranches, KinkTrial};
 use super::limit_values::{LimitValues, LimitedPoint, LimitedStep, SLACK};
 use super::quadratic_program::{QuadraticProgram, QuadraticSolution};
 use super::trust_region::{
-    HessianModel, LeastSquaresPoint, TrustRegion, TrustRegionStep, decrease,
+    HessianModel, LeastSquaresPoint, TrustRegion, TrustRegionMemory, TrustRegionStep, decrease,
 };
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use serde::{Deserialize, Serialize};
 
 /// The state of the method between two trials.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +28,23 @@ pub struct LimitedTrustRegion {
     pub(super) branches: KinkBranches,
     /// True if the last trial has met a kink.
     met_kink: bool,
+}
+
+/// The state of a [`LimitedTrustRegion`] in the units of the parameters themselves, whatever they are
+/// scaled by.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LimitedTrustRegionMemory {
+    region: TrustRegionMemory,
+    prices: Vec<f64>,
+    branches: Vec<BranchMemory>,
+}
+
+impl LimitedTrustRegionMemory {
+    /// The same with a region that is smaller by a factor.
+    pub fn shrink(&mut self, factor: f64) {
+        self.region.shrink(factor);
+    }
 }
 
 /// The share of a limit's weight that counts for the scales of the parameters.
@@ -55,6 +73,29 @@ impl LimitedTrustRegion {
             branches: KinkBranches::default(),
             met_kink: false,
         }
+    }
+
+    /// The method as it was, for parameters scaled by `units` and this many limits; a new one if their
+    /// numbers differ.
+    pub fn resume(memory: &LimitedTrustRegionMemory, units: &[f64], limits: usize) -> Self {
+        if memory.prices.len() != limits {
+            return Self::new(units.len(), limits);
+        }
+        Self {
+            region: TrustRegion::resume(&memory.region, units),
+            prices: memory.prices.clone(),
+            branches: KinkBranches::resume(&memory.branches, units, limits),
+            ..Self::new(units.len(), limits)
+        }
+    }
+
+    /// The state of the method, for parameters scaled by `units`; `None` if a number of it is not finite.
+    pub fn memory(&self, units: &[f64]) -> Option<LimitedTrustRegionMemory> {
+        let region = self.region.memory(units)?;
+        let branches = self.branches.memory(units)?;
+        let is_finite = self.prices.iter().all(|price| price.is_finite());
+        let prices = self.prices.clone();
+        is_finite.then_some(LimitedTrustRegionMemory { region, prices, branches })
     }
 
     /// True if the region is so small that no step would change anything.

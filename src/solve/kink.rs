@@ -8,6 +8,7 @@
 
 use super::limit_values::LimitValues;
 use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
 
 /// The branches of kinked limits beside those of the current point.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -37,6 +38,16 @@ struct Branch {
     age: usize,
 }
 
+/// A [`Branch`] in the units of the parameters themselves.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct BranchMemory {
+    limit: usize,
+    value: f64,
+    slope: Vec<f64>,
+    age: usize,
+}
+
 /// The violation beyond the one promised that tells of a kink, in the unit of the limit.
 const SURPRISE: f64 = 1e-7;
 /// The difference of two slopes, relative to one of them, above which they are of two branches.
@@ -47,6 +58,34 @@ const KINKED: f64 = 0.3;
 const MAX_AGE: usize = 10;
 
 impl KinkBranches {
+    /// The branches of so many limits as they were, for parameters scaled by `units`.
+    pub(super) fn resume(memory: &[BranchMemory], units: &[f64], limits: usize) -> Self {
+        let is_known =
+            |branch: &&BranchMemory| branch.limit < limits && branch.slope.len() == units.len();
+        let scaled = |branch: &BranchMemory| Branch {
+            limit: branch.limit,
+            value: branch.value,
+            slope: DVector::from_fn(units.len(), |i, _| branch.slope[i] * units[i]),
+            age: branch.age,
+        };
+        Self { branches: memory.iter().filter(is_known).map(scaled).collect() }
+    }
+
+    /// The branches, for parameters scaled by `units`; `None` if a number of them is not finite.
+    pub(super) fn memory(&self, units: &[f64]) -> Option<Vec<BranchMemory>> {
+        let unscaled = |branch: &Branch| BranchMemory {
+            limit: branch.limit,
+            value: branch.value,
+            slope: branch.slope.iter().zip(units).map(|(slope, unit)| slope / unit).collect(),
+            age: branch.age,
+        };
+        let all: Vec<BranchMemory> = self.branches.iter().map(unscaled).collect();
+        let is_finite = |branch: &BranchMemory| {
+            branch.value.is_finite() && branch.slope.iter().all(|slope| slope.is_finite())
+        };
+        all.iter().all(is_finite).then_some(all)
+    }
+
     /// The limits at a point, and after them those of the branches.
     pub(super) fn with_branches(&self, limits: &LimitValues) -> LimitValues {
         let (own, count) = (limits.values.len(), limits.values.len() + self.branches.len());

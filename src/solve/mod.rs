@@ -25,7 +25,7 @@ pub use bounds::ParameterBounds;
 pub use boxed_quadratic::{BoxedQuadratic, scaled_pseudoinverse};
 pub use cgls::cgls;
 pub use conflict::smallest_conflict;
-pub use constrained::LimitedTrustRegion;
+pub use constrained::{LimitedTrustRegion, LimitedTrustRegionMemory};
 pub use lbfgs::{Lbfgs, LbfgsStep};
 pub use levenberg_marquardt::{
     Damping, LevenbergMarquardt, LevenbergMarquardtStep, NielsenDamping, ResidualRows, damped_step,

@@ -18,7 +18,9 @@ use crate::lens::Lens;
 use crate::merit::{
     DerivativeLevel, Limit, LimitedSum, Merit, MeritError, SumOfSquares, Term, TermValue,
 };
-use crate::solve::{LimitValues, LimitedPoint, LimitedStep, LimitedTrustRegion, SLACK};
+use crate::solve::{
+    LimitValues, LimitedPoint, LimitedStep, LimitedTrustRegion, LimitedTrustRegionMemory, SLACK,
+};
 use nalgebra::{DMatrix, DVector};
 
 /// The number of accepted steps between two checks of the rays, at most.
@@ -32,6 +34,9 @@ const PATIENCE: usize = 5;
 const RESTARTS: usize = 3;
 /// The promised gain, relative to the tolerance of the spots, below which a step is idle.
 const SMALL_GAIN: f64 = 1e-2;
+
+/// The same for a segment of a descent.
+const SEGMENT_GAIN: f64 = 1e-7;
 
 /// The largest violation of a limit, in its unit, at the end.
 const KEPT: f64 = 1e-9;
@@ -49,6 +54,10 @@ pub(super) struct LimitedOptimizer {
     /// The norm of the projected gradient at the start.
     first_gradient: Option<f64>,
     tolerance: f64,
+    /// The promised gain, relative to the merit, below which a step is idle.
+    idle_gain: f64,
+    /// The number of evaluations that it never exceeds.
+    most_evaluations: usize,
     /// The largest violation of the best lens, 0 up to [`SLACK`].
     best_violation: f64,
     /// The best lens with newly found rays, its violation and its merit.
@@ -77,6 +86,8 @@ impl LimitedOptimizer {
             limits: found.limits,
             first_gradient: None,
             tolerance,
+            idle_gain: SMALL_GAIN * tolerance,
+            most_evaluations: usize::MAX,
             best_violation: 0.0,
             verified: None,
             prices: Vec::new(),
@@ -94,6 +105,40 @@ impl LimitedOptimizer {
         this.best_violation = this.counted_violation();
         this.note_prices();
         Ok(this)
+    }
+
+    /// The same as a segment of a descent, after an earlier one, that takes so many evaluations at most. The
+    /// search that it is part of ends the descent: within the tolerance of the spots there is still something
+    /// to gain.
+    pub(super) fn into_segment(
+        mut self,
+        evaluations: usize,
+        memory: Option<&LimitedTrustRegionMemory>,
+    ) -> Self {
+        self.idle_gain = SEGMENT_GAIN;
+        self.most_evaluations = self.state.evaluations.saturating_add(evaluations);
+        if let Some(memory) = memory {
+            self.method = LimitedTrustRegion::resume(memory, &self.state.scales, self.limits.len());
+        }
+        self
+    }
+
+    /// The region, to go on with; `None` once the descent has ended.
+    pub(super) fn memory(&self) -> Option<LimitedTrustRegionMemory> {
+        if self.end.is_some() {
+            return None;
+        }
+        self.method.memory(&self.state.scales)
+    }
+
+    /// The evaluations that it may still take.
+    pub(super) fn evaluations_left(&self) -> usize {
+        self.most_evaluations.saturating_sub(self.state.evaluations)
+    }
+
+    /// The state of the descent.
+    pub(super) fn into_state(self) -> OptimizerState {
+        self.state
     }
 
     /// The merit of the current lens without its limits.
@@ -163,7 +208,7 @@ impl LimitedOptimizer {
     }
 
     fn small_gain(&self) -> f64 {
-        SMALL_GAIN * self.tolerance * self.point.objective.value
+        self.idle_gain * self.point.objective.value
     }
 
     /// True if a step brings the limits closer by a thousandth, or a longer one would.
@@ -197,7 +242,8 @@ impl LimitedOptimizer {
         }
         // The limits are curved: a second trial that follows them may succeed.
         let follows = to.limits.violation() > SLACK.max(2.0 * self.point.limits.violation());
-        follows && !self.method.met_kink() && self.second_trial(&step, &values, &to.limits)
+        let may_follow = !self.method.met_kink() && self.evaluations_left() > 0;
+        follows && may_follow && self.second_trial(&step, &values, &to.limits)
     }
 
     fn second_trial(&mut self, step: &LimitedStep, from: &[f64], found: &LimitValues) -> bool {

@@ -79,6 +79,9 @@ impl LimitedOptimizer {
 
     /// Corrects the current lens once; false if no other correction may follow.
     fn correct(&mut self, limits: &LimitValues) -> bool {
+        if self.evaluations_left() == 0 {
+            return false;
+        }
         let Some(change) = self.method.restoration(&self.point, limits, &self.state.room()) else {
             return false;
         };

@@ -4,13 +4,14 @@
 //! to the start, focal length, and the limits of manufacturing as penalties. A local move finds the
 //! pupils of the lens anew and takes some optimization steps with derivatives that include the
 //! motion of the pupils. It is evaluated with the pupils of the new lens; a move that made the lens
-//! worse is undone.
+//! worse is undone. Where moves by penalties gain little, the next ones keep the limits as constraints.
 
 mod aspheres;
 mod descent_settings;
 mod displacement;
 mod finalize;
 mod langevin_units;
+mod local_move;
 mod minimum;
 mod open_apertures;
 mod plan;
@@ -37,7 +38,7 @@ use super::{
 };
 use crate::lens::{Lens, LensError, Parameter, Quantity};
 use crate::merit::{Goal, Merit, MeritError};
-use crate::optimize::{DescentState, SegmentResult, SegmentSettings, run_segment};
+use crate::optimize::DescentState;
 use crate::pupil::{RayModelError, limited_by_stop};
 use std::sync::Arc;
 use variables::VariableRules;
@@ -284,42 +285,7 @@ impl LensLandscape {
         let merit = self.merit(lens, self.local.tolerance)?;
         Ok(self.priced(lens, merit.value(&merit.values(lens))?))
     }
-
-    /// A local move of at most `most` steps: the new lens, its loss, and the number of gradients.
-    fn try_move(
-        &self,
-        lens: &Arc<Lens>,
-        memory: &mut DescentState,
-        most: usize,
-    ) -> Result<(Arc<Lens>, f64, usize), MeritError> {
-        let DescentSettings { method, steps, rate, tolerance, coarse, .. } = self.local;
-        let is_coarse = memory.steps < self.local.coarse_steps;
-        let merit = self.merit(lens, if is_coarse { coarse } else { tolerance })?;
-        let asked = SegmentSettings { method, steps: steps.min(most), rate };
-        let SegmentResult { lens: mut there, initial_merit, gradients } =
-            run_segment(merit, &self.with_variables(lens), asked, memory)?;
-        let before = self.priced(lens, initial_merit);
-        there.variables.clone_from(&lens.variables);
-        match self.evaluate(&there) {
-            Ok(after) if after < before || is_coarse => {
-                memory.grow_step();
-                Ok((Arc::new(there), after, gradients))
-            }
-            Ok(after) if after < (1.0 + SLACK) * before => {
-                memory.shrink_step();
-                Ok((Arc::new(there), after, gradients))
-            }
-            Ok(_) | Err(_) => {
-                memory.restart_slower();
-                let before = if is_coarse { self.evaluate(lens)? } else { before };
-                Ok((lens.clone(), before, gradients))
-            }
-        }
-    }
 }
-
-/// The relative increase of the loss that a move may make, since the rays of two lenses differ.
-const SLACK: f64 = 0.05;
 
 /// The maximum number of random lenses that are tried.
 const MAX_DRAWS: usize = 200;
@@ -343,7 +309,7 @@ impl Landscape for LensLandscape {
         most: usize,
     ) -> (Arc<Lens>, f64, usize) {
         match self.try_move(lens, memory, most) {
-            Ok(moved) => moved,
+            Ok(moved) => (moved.lens, moved.loss, moved.gradients),
             Err(_) => (lens.clone(), f64::INFINITY, 0),
         }
     }

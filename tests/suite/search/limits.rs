@@ -2,6 +2,7 @@
 
 use super::super::merit::bundled;
 use aplanat::lens::Wavelength;
+use aplanat::optimize::DescentState;
 use aplanat::search::lens_landscape::{SearchPlan, run};
 use aplanat::search::{
     Landscape as _, OfferOutcome, SearchMethod, SearchRules, SearchSettings, Settlement,
@@ -19,6 +20,29 @@ fn plan(rules: SearchRules) -> SearchPlan {
         ..SearchSettings::default()
     };
     SearchPlan { rules, settings, ..SearchPlan::default() }
+}
+
+/// Moves by penalties come first; once they gain little, moves keep every limit.
+#[test]
+fn a_descent_keeps_its_limits_once_it_gains_little() {
+    let mut lens = bundled("cooke_triplet_100_f27");
+    lens.wavelengths = vec![Wavelength { um: 0.5875618, weight: 1.0, primary: true }];
+    let landscape = plan(SearchRules::default()).landscape(&lens).unwrap();
+    let (mut at, mut memory) = (landscape.start().clone(), DescentState::default());
+    let mut loss = landscape.loss(&at);
+    let mut kept = 0;
+    for _ in 0..16 {
+        let keeps_limits = memory.keeps_limits;
+        let (there, found, gradients) = landscape.descend(&at, &mut memory);
+        assert!(gradients > 0 && found < 1.05 * loss, "{loss:e} {found:e}");
+        assert_eq!(found, landscape.loss(&there));
+        if keeps_limits && there != at {
+            assert!(landscape.limit_violation(&there).unwrap() <= 1e-9);
+            kept += 1;
+        }
+        (at, loss) = (there, found);
+    }
+    assert!(kept > 3, "{kept} moves kept the limits");
 }
 
 /// The start breaks limits of its glass, of its air and of its track.
