@@ -83,6 +83,11 @@ const RATE_DECAY: f64 = 0.8;
 const REGION_DECAY: f64 = 0.25;
 
 impl DescentState {
+    /// A new descent whose limits are penalties to its end.
+    pub fn with_penalties() -> Self {
+        Self { failures_with_limits: usize::MAX, ..Self::default() }
+    }
+
     /// Raises the rate after a segment that improved the merit.
     pub fn grow_step(&mut self) {
         self.pace = Some((RATE_GROWTH * self.pace.unwrap_or(1.0)).min(MAX_RATE));

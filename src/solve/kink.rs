@@ -212,6 +212,22 @@ mod tests {
     }
 
     #[test]
+    fn branches_are_resumed_in_any_units() {
+        let slope = DVector::from_vec(vec![1.0, -3.0]);
+        let branch = Branch { limit: 1, value: 2.0, slope, age: 4 };
+        let branches = KinkBranches { branches: vec![branch] };
+        let memory = branches.memory(&[0.5, 8.0]).unwrap();
+        assert_eq!(KinkBranches::resume(&memory, &[0.5, 8.0], 2), branches);
+        let other = KinkBranches::resume(&memory, &[1.0, 4.0], 2);
+        assert_eq!(other.branches[0].slope.as_slice(), [2.0, -1.5]);
+        // Branches of a limit or of a parameter that there is no longer are forgotten.
+        assert!(KinkBranches::resume(&memory, &[0.5, 8.0], 1).branches.is_empty());
+        assert!(KinkBranches::resume(&memory, &[0.5], 2).branches.is_empty());
+        let lost = Branch { value: f64::NAN, ..branches.branches[0].clone() };
+        assert_eq!(KinkBranches { branches: vec![lost] }.memory(&[1.0, 1.0]), None);
+    }
+
+    #[test]
     fn a_branch_follows_its_slope_and_is_forgotten_when_it_is_asked_to_or_old() {
         let limits = LimitValues {
             values: DVector::from_element(1, 9.0),

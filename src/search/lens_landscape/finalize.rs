@@ -110,7 +110,8 @@ pub fn finalize(landscape: &LensLandscape, lens: &Lens) -> Result<FinalizedLens,
     let (mut lens, glasses, unlisted) = with_catalogue_glasses(lens, &landscape.rules)?;
     for round in 0..ROUNDS {
         let tight = landscape.tighten(round);
-        let (mut memory, mut at) = (DescentState::default(), Arc::new(lens.clone()));
+        // Limits that cannot all hold are broken by a little each, and tightened in the next round.
+        let (mut memory, mut at) = (DescentState::with_penalties(), Arc::new(lens.clone()));
         let mut best = tight.loss(&at);
         for _ in 0..MOVES {
             let (there, loss, _) = tight.descend(&at, &mut memory);

@@ -101,8 +101,8 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         }
     }
 
-    /// What the next race begins with: whatever has gained most by gradient, of the perturbations that the
-    /// landscape has. No displacement leads from a structure that is not permitted to one that is.
+    /// The perturbation of the next race: the one that has gained most by gradient, of those that the landscape
+    /// has. No displacement leads from a structure that is not permitted to one that is.
     fn next_perturbation<L>(&self, race: &Race, landscape: &L) -> Perturbation
     where
         L: Landscape<Point = P, Memory = M>,

@@ -92,7 +92,7 @@ struct DescentRate {
     loss: f64,
 }
 
-/// What the trials of a race begin with.
+/// The changes with which the trials of a race begin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Perturbation {
@@ -125,7 +125,7 @@ pub(in crate::search) struct Race {
     winner: Option<(MutationKind, f64)>,
     /// The gradients of the race so far.
     gradients: u64,
-    /// What the trials of the race begin with.
+    /// The changes with which the trials of the race begin.
     #[serde(default)]
     pub(super) perturbation: Perturbation,
     /// The gain by gradient of the races that began with a perturbation.
