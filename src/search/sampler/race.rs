@@ -170,8 +170,12 @@ impl Race {
 
     /// The gain by gradient of races with such a perturbation so far.
     pub(super) fn rate(&self, perturbation: Perturbation) -> f64 {
+        self.gain_rate(perturbation).value()
+    }
+
+    fn gain_rate(&self, perturbation: Perturbation) -> GainRate {
         let expected = GainRate::expected(EXPECTATION_GRADIENTS);
-        self.rates.get(&perturbation).copied().unwrap_or(expected).value()
+        self.rates.get(&perturbation).copied().unwrap_or(expected)
     }
 
     /// The rate that a descent needs to go on where the next race begins with such a perturbation.
@@ -236,9 +240,9 @@ impl Race {
             self.of_kind(kind).add(gain, gradients as f64);
         }
         if self.gradients > 0 {
-            let expected = GainRate::expected(EXPECTATION_GRADIENTS);
-            let rate = self.rates.entry(self.perturbation).or_insert(expected);
+            let mut rate = self.gain_rate(self.perturbation);
             rate.add(gain, self.gradients as f64);
+            self.rates.insert(self.perturbation, rate);
         }
         self.gradients = 0;
     }
