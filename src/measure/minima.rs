@@ -1,29 +1,32 @@
 //! The number of different minima that descents from random lenses of one structure find in a time.
 //!
-//! A descent ends at a minimum when the optimizer says so: its gradient has vanished, or nothing can be
-//! gained at the tolerance of the spots. With rays found anew, the derivatives must then promise less than
-//! the distance below which two minima are the same; otherwise the descent begins again from there.
+//! A descent counts limits as penalties until it gains little, and keeps them as constraints from there on: a
+//! minimum often lies where a limit turns sharply, which penalties approach without an end. It ends at a
+//! minimum when the optimizer says so, with rays found anew: the gradient has vanished, or nothing can be
+//! gained at the tolerance of the spots, and every limit is kept to 1e-9 of its unit.
 //!
 //! Two minima are the same if the signs of their curvatures and powers are, and if they are near in the
 //! metric of the residuals: `d² = dxᵀ Jᵀ J dx / F` predicts the relative change of the merit between
 //! them. Near a distance of 1 the merit between them decides: a hill above both means two.
 
 use super::timing::Stopwatch;
-use crate::lens::{Lens, Variable};
-use crate::merit::{DerivativeLevel, Merit, MeritError, SumOfSquares};
-use crate::optimize::{DescentMethod, Optimizer, start_from};
-use crate::search::Random;
+use crate::lens::Lens;
+use crate::merit::{DerivativeLevel, Merit, MeritError};
+use crate::optimize::{DescentMethod, DescentState, OptimizationProgress, Optimizer, start_from};
 use crate::search::lens_landscape::{LensLandscape, SearchPlan, SearchSetupError, curvature_signs};
-use crate::solve::{LeastSquaresPoint, TrustRegion};
+use crate::search::{Landscape as _, Random};
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng as _;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The evaluations after which a descent that has not ended is given up.
 const MOST_EVALUATIONS: usize = 1000;
+/// The relative gain of a move by penalties below which the limits are kept.
+const SMALL_GAIN: f64 = 0.1;
 /// The starts between two looks at the flag.
 const BATCH: u64 = 32;
 /// The parts of the way from the lens to random numbers that are tried: of many surfaces few random ones
@@ -46,7 +49,7 @@ pub struct MinimaCount {
     pub lost: u64,
     /// The descents that were given up.
     pub unfinished: u64,
-    /// The descents that came to a halt where the derivatives promise more: at no minimum.
+    /// The descents that came to a halt where the derivatives promise more, or where limits are broken.
     pub stuck: u64,
     /// The descents that ended at a minimum.
     pub ended: u64,
@@ -97,8 +100,6 @@ struct EndedDescent {
     values: DVector<f64>,
     normal: DMatrix<f64>,
     value: f64,
-    /// The decrease of the merit that the derivatives promise within the bounds of the variables.
-    promised: f64,
 }
 
 /// Counts the minima that descents from random lenses with the structure of a lens find. The same seed gives the same minima on any number of threads. Once
@@ -172,40 +173,49 @@ fn descend(
     let mut random = Random::seed_from_u64(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ start);
     let drawn = SPREADS.iter().find_map(|spread| landscape.draw_near(*spread, &mut random));
     let Some(drawn) = drawn else { return (DescentEnd::Lost, 0) };
-    let (mut lens, mut used, mut before) = ((*drawn).clone(), 0, f64::INFINITY);
-    loop {
+    let (lens, used) = approach(landscape, drawn);
+    let Some(lens) = lens else { return (DescentEnd::Lost, used) };
+    let optimizer = landscape.constrained_merit(&lens).and_then(|merit| {
         let free = landscape.with_variables(&lens);
-        let optimizer = landscape
-            .merit(&lens, tolerance)
-            .and_then(|merit| start_from(DescentMethod::TrustRegion, merit, &free, tolerance));
-        let Ok(optimizer) = optimizer else { return (DescentEnd::Lost, used) };
-        let Some((mut halted, evaluations)) = halt(optimizer, MOST_EVALUATIONS - used) else {
-            return (DescentEnd::Unfinished, MOST_EVALUATIONS);
-        };
-        used += evaluations;
-        let Ok(found) = EndedDescent::new(landscape, &halted, tolerance) else {
-            return (DescentEnd::Lost, used);
-        };
-        if found.is_minimum() {
-            return (DescentEnd::Minimum(Box::new(found)), used);
-        }
-        if !(found.value < (1.0 - SAME) * before) || used >= MOST_EVALUATIONS {
-            return (DescentEnd::Stuck, used);
-        }
-        halted.variables.clone_from(&drawn.variables);
-        (lens, before) = (halted, found.value);
-    }
+        start_from(DescentMethod::TrustRegion, merit, &free, tolerance)
+    });
+    let Ok(optimizer) = optimizer else { return (DescentEnd::Lost, used) };
+    let (halted, last) = run(optimizer, MOST_EVALUATIONS.saturating_sub(used));
+    let used = used + last.evaluations;
+    let end = match last.end {
+        None => DescentEnd::Unfinished,
+        Some(end) if end.is_minimum() => EndedDescent::new(landscape, &halted, tolerance)
+            .map_or(DescentEnd::Lost, |found| DescentEnd::Minimum(Box::new(found))),
+        Some(_) => DescentEnd::Stuck,
+    };
+    (end, used)
 }
 
-/// The lens where an optimizer comes to a halt, and its evaluations; `None` after too many.
-fn halt(mut optimizer: Box<dyn Optimizer>, most: usize) -> Option<(Lens, usize)> {
+/// A lens after moves by penalties until one gains little, `None` if it has lost the light; and their
+/// gradients.
+fn approach(landscape: &LensLandscape, start: Arc<Lens>) -> (Option<Arc<Lens>>, usize) {
+    let mut memory = DescentState::with_penalties();
+    let (mut lens, mut used, mut before) = (start, 0, f64::INFINITY);
+    while used < MOST_EVALUATIONS {
+        let (next, loss, gradients) = landscape.descend(&lens, &mut memory);
+        (lens, used) = (next, used + gradients.max(1));
+        if !loss.is_finite() {
+            return (None, used);
+        }
+        if loss > (1.0 - SMALL_GAIN) * before {
+            break;
+        }
+        before = loss;
+    }
+    (Some(lens), used)
+}
+
+/// The lens where an optimizer ends or has made so many evaluations, and its last step.
+fn run(mut optimizer: Box<dyn Optimizer>, most: usize) -> (Lens, OptimizationProgress) {
     loop {
         let progress = optimizer.step();
-        if progress.finished {
-            return Some((optimizer.best().clone(), progress.evaluations));
-        }
-        if progress.evaluations >= most {
-            return None;
+        if progress.finished || progress.evaluations >= most {
+            return (optimizer.best().clone(), progress);
         }
     }
 }
@@ -217,18 +227,12 @@ impl EndedDescent {
         let values = merit.values(&lens);
         let sum = merit.evaluate(&values, DerivativeLevel::Normal)?;
         Ok(Self {
-            promised: promised_decrease(&merit, &values, &sum),
             signs: curvature_signs(&lens, landscape.focal_length()),
             values: DVector::from_vec(values),
             normal: sum.normal,
             value: sum.value,
             merit,
         })
-    }
-
-    /// True if the minimum that the derivatives predict is nearer than two that are the same may be apart.
-    fn is_minimum(&self) -> bool {
-        self.promised <= SAME * self.value
     }
 
     /// The square of the distance of another minimum.
@@ -256,23 +260,6 @@ impl EndedDescent {
             !self.merit.value(between.as_slice()).is_ok_and(|merit| merit <= top)
         })
     }
-}
-
-/// The decrease of the merit to the minimum of its model within the bounds of the variables.
-fn promised_decrease(merit: &Merit, values: &[f64], sum: &SumOfSquares) -> f64 {
-    let range = |(variable, value): (&Variable, &f64)| {
-        let low = variable.min.map_or(f64::NEG_INFINITY, |min| (min - value).min(0.0));
-        let high = variable.max.map_or(f64::INFINITY, |max| (max - value).max(0.0));
-        [low, high]
-    };
-    let room: Vec<[f64; 2]> = merit.variables().iter().zip(values).map(range).collect();
-    let half_gradient = &sum.gradient * 0.5;
-    let (normal, separate) = (sum.normal.clone(), sum.separate.clone());
-    let point = LeastSquaresPoint { value: sum.value, half_gradient, normal, separate };
-    let mut region = TrustRegion::new(values.len());
-    // This sets the units of the variables.
-    region.projected_gradient(&point, &room);
-    region.attainable_decrease(&point, &room)
 }
 
 /// Enters a minimum among those with the same signs; of two that are the same the better one is kept.

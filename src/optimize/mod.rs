@@ -106,6 +106,11 @@ pub enum OptimizationEnd {
 }
 
 impl OptimizationEnd {
+    /// True for an end where nothing can be gained.
+    pub fn is_minimum(self) -> bool {
+        matches!(self, Self::Gradient | Self::Tolerance)
+    }
+
     /// The reason in words.
     pub fn text(self) -> &'static str {
         match self {

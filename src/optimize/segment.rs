@@ -51,6 +51,15 @@ pub struct DescentState {
     /// True if the next segment keeps the limits of the goal.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub keeps_limits: bool,
+    /// True if limits are penalties to the end of the descent.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub penalties_only: bool,
+    /// The number of segments in a row so far that kept the limits.
+    #[serde(default)]
+    pub limited_segments: usize,
+    /// True if the last segment met a test that ends the descent.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub has_ended: bool,
     /// The number of segments that kept the limits and gained nothing.
     #[serde(default)]
     pub failures_with_limits: usize,
@@ -68,6 +77,8 @@ pub struct SegmentResult {
     /// The number of evaluations of the merit with derivatives, those of rejected steps included;
     /// at least 1 for the start.
     pub gradients: usize,
+    /// True if a test of the method has ended the descent: more steps are expected to gain nothing.
+    pub has_ended: bool,
 }
 
 /// The evaluations of a segment that are left for corrections at its end.
@@ -85,7 +96,7 @@ const REGION_DECAY: f64 = 0.25;
 impl DescentState {
     /// A new descent whose limits are penalties to its end.
     pub fn with_penalties() -> Self {
-        Self { failures_with_limits: usize::MAX, ..Self::default() }
+        Self { penalties_only: true, ..Self::default() }
     }
 
     /// Raises the rate after a segment that improved the merit.
@@ -144,6 +155,7 @@ pub fn run_segment(
         lens: state.current,
         initial_merit: before,
         gradients: (state.evaluations - 1).max(1),
+        has_ended: false,
     })
 }
 
@@ -170,10 +182,11 @@ pub fn run_limited_segment(
         }
     }
     memory.limited_region = search.memory();
+    let has_ended = search.is_at_minimum();
     search.verify_best();
     let state = search.into_state();
     let gradients = (state.evaluations - 1).max(1);
-    Ok(SegmentResult { lens: state.best, initial_merit, gradients })
+    Ok(SegmentResult { lens: state.best, initial_merit, gradients, has_ended })
 }
 
 fn adam(

@@ -45,6 +45,12 @@ pub trait Landscape: Sync {
         self.descend(point, memory)
     }
 
+    /// True if the last move of the descent with this memory met a test of its method that ends it, so that
+    /// the next moves are expected to gain nothing; by default a descent never ends by itself.
+    fn has_ended(&self, _memory: &Self::Memory) -> bool {
+        false
+    }
+
     /// A random point: `p_global` of (4.14).
     fn draw(&self, random: &mut Random) -> Result<Self::Point, MutationError>;
 

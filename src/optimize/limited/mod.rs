@@ -131,6 +131,11 @@ impl LimitedOptimizer {
         self.method.memory(&self.state.scales)
     }
 
+    /// True if it has ended where nothing can be gained within the limits.
+    pub(super) fn is_at_minimum(&self) -> bool {
+        self.end.is_some_and(OptimizationEnd::is_minimum)
+    }
+
     /// The evaluations that it may still take.
     pub(super) fn evaluations_left(&self) -> usize {
         self.most_evaluations.saturating_sub(self.state.evaluations)
@@ -191,8 +196,11 @@ impl LimitedOptimizer {
             return Ok(0.0);
         }
         if self.idle >= PATIENCE || self.method.is_exhausted(&self.point) {
-            let kept = is_kept || !step.is_relaxed;
-            return Err(if kept { OptimizationEnd::Tolerance } else { OptimizationEnd::Conflict });
+            return Err(match (is_kept || !step.is_relaxed, is_idle) {
+                (false, _) => OptimizationEnd::Conflict,
+                (true, true) => OptimizationEnd::Tolerance,
+                (true, false) => OptimizationEnd::NoGain,
+            });
         }
         Ok(if self.take(step) { 1.0 } else { 0.0 })
     }
@@ -200,11 +208,7 @@ impl LimitedOptimizer {
     /// A smaller region where no step could be computed, as long as one remains.
     fn without_step(&mut self) -> Result<f64, OptimizationEnd> {
         self.method.note_no_step();
-        if self.method.is_exhausted(&self.point) {
-            Err(OptimizationEnd::Tolerance)
-        } else {
-            Ok(0.0)
-        }
+        if self.method.is_exhausted(&self.point) { Err(OptimizationEnd::NoGain) } else { Ok(0.0) }
     }
 
     fn small_gain(&self) -> f64 {

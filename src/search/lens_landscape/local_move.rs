@@ -17,8 +17,10 @@ use std::sync::Arc;
 /// The gain of a move relative to the loss below which the next one keeps the limits.
 const SLOW_GAIN: f64 = 0.1;
 /// The gradients of a move that keeps the limits, relative to the steps of other moves: its rays and
-/// corrections at the end take a part of them.
+/// corrections at the end take a part of them. Each move of a row of them is longer by as much as the first
+/// one, up to a multiple of it.
 const LIMITED_GRADIENTS: usize = 3;
+const LONGEST_MOVE: usize = 4;
 /// The gradients below which a move does not keep the limits.
 const FEWEST_GRADIENTS: usize = 20;
 /// The number of such moves in a descent that may fail.
@@ -44,15 +46,18 @@ impl LensLandscape {
         memory: &mut DescentState,
         most: usize,
     ) -> Result<LocalMove, MeritError> {
+        memory.has_ended = false;
         if memory.keeps_limits && most >= FEWEST_GRADIENTS {
             return self.limited_move(lens, memory, most);
         }
         let (before, moved) = self.penalized_move(lens, memory, most)?;
         let is_slow = moved.loss >= (1.0 - SLOW_GAIN) * before;
         memory.keeps_limits = is_slow
+            && !memory.penalties_only
             && self.local.method == DescentMethod::TrustRegion
             && self.goal.terms.iter().any(|weighted| weighted.term.is_limit())
             && memory.failures_with_limits < FAILURES;
+        memory.limited_segments = 0;
         Ok(moved)
     }
 
@@ -66,17 +71,21 @@ impl LensLandscape {
     ) -> Result<LocalMove, MeritError> {
         let before = self.evaluate(lens)?;
         let tolerance = self.local.tolerance;
-        let evaluations = (LIMITED_GRADIENTS * self.local.steps).min(most);
+        let multiple = (memory.limited_segments + 1).min(LONGEST_MOVE);
+        let evaluations = (multiple * LIMITED_GRADIENTS * self.local.steps).min(most);
         let asked = LimitedSegment { evaluations, tolerance };
         let free = self.with_variables(lens);
         let segment = self
             .constrained_merit(lens)
             .and_then(|merit| run_limited_segment(merit, &free, asked, memory));
         let gradients = segment.as_ref().map_or(1, |segment| segment.gradients);
+        let has_ended = segment.as_ref().is_ok_and(|segment| segment.has_ended);
         let moved = segment.and_then(|segment| self.evaluated(segment, lens));
         if let Ok((there, loss)) = moved
             && loss < (1.0 + SLACK) * before
         {
+            memory.has_ended = has_ended;
+            memory.limited_segments += 1;
             return Ok(LocalMove { lens: there, loss, gradients });
         }
         memory.keeps_limits = false;

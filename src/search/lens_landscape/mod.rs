@@ -314,6 +314,10 @@ impl Landscape for LensLandscape {
         }
     }
 
+    fn has_ended(&self, memory: &DescentState) -> bool {
+        memory.has_ended
+    }
+
     fn draw(&self, random: &mut Random) -> Result<Arc<Lens>, MutationError> {
         let none = || MutationError::new(MutationKind::Global, Refusal::NoRandomLens);
         self.draw_near(1.0, random).ok_or_else(none)

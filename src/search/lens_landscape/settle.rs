@@ -19,7 +19,7 @@ const ROUNDS: usize = 3;
 
 impl LensLandscape {
     /// The merit function of a lens with the limits of the goal as constraints.
-    pub(super) fn constrained_merit(&self, lens: &Lens) -> Result<Merit, MeritError> {
+    pub fn constrained_merit(&self, lens: &Lens) -> Result<Merit, MeritError> {
         let goal = Goal { limits: LimitTreatment::Constraints, ..self.goal.clone() };
         let merit = Merit::new(&self.with_variables(lens), &goal, self.local.tolerance)?;
         Ok(merit.with_initial_light(&self.light))

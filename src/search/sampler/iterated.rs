@@ -219,8 +219,11 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             descent.memory = M::default();
         }
         let is_outside = landscape.structure_violation(&descent.best) > 0;
-        let ended = (is_lost || is_outside).then_some(0.0);
-        let Some(rate) = ended.or_else(|| race.measured(gradients, loss)) else { return false };
+        let has_ended = is_lost || is_outside || landscape.has_ended(&descent.memory);
+        let ended = has_ended.then_some([0.0; 2]);
+        let Some([_, rate]) = ended.or_else(|| race.measured(gradients, loss)) else {
+            return false;
+        };
         race.best_rate = rate;
         rate <= self.required_rate(race, landscape)
     }
@@ -335,8 +338,10 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         };
         let (gradients, loss) = (descent.gradients, descent.best_loss);
         let mut end = DescentEnd::InfiniteLoss;
-        if descent.loss.is_finite() {
-            let Some(rate) = race.measured(gradients, loss) else { return };
+        if descent.loss.is_finite() && landscape.has_ended(&descent.memory) {
+            end = DescentEnd::Unpromising;
+        } else if descent.loss.is_finite() {
+            let Some([rate, _]) = race.measured(gradients, loss) else { return };
             // A better loss with a structure farther from the permitted ones never overtakes.
             if loss > best && Race::may_catch_up(loss, best, rate) {
                 return;
@@ -383,11 +388,15 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         std::mem::swap(&mut first[0].descent, &mut others[0].descent);
         std::mem::swap(&mut first[0].generation, &mut others[0].generation);
         self.end_chain(chain, DescentEnd::Outranked, landscape, events);
+        self.begin_descent_of_best(race);
+        true
+    }
+
+    fn begin_descent_of_best(&self, race: &mut Race) {
         if let Some(descent) = &self.chains[0].descent {
             race.measure_from(descent.gradients, descent.best_loss);
         }
         race.stage = RaceStage::Best;
-        true
     }
 
     /// Makes a point that another run has found, and that has this generation, the best one if it is
@@ -420,7 +429,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         }
         race.settle(0.0, 0);
         if race.best_rate > required {
-            race.stage = RaceStage::Best;
+            self.begin_descent_of_best(race);
         } else {
             self.begin_race(race, landscape);
         }

@@ -9,9 +9,10 @@
 //! from the start.
 //!
 //! Whatever gains fastest comes next: a descent goes on for as long as it gains faster than trials do on
-//! average, and of the ways to make trials that with the largest gain by gradient so far follows it. This
-//! maximizes the gain for a budget (Charnov, "Optimal Foraging, the Marginal Value Theorem", 1976). Kinds of
-//! mutation are drawn in proportion to their gain by gradient.
+//! average, by its last block of gradients or by the mean of the last few, and of the ways to make trials
+//! that with the largest gain by gradient so far follows it. This maximizes the gain for a budget (Charnov,
+//! "Optimal Foraging, the Marginal Value Theorem", 1976). Kinds of mutation are drawn in proportion to their
+//! gain by gradient.
 
 use crate::search::{MutationKind, MutationWeights};
 use serde::{Deserialize, Serialize};
@@ -21,6 +22,8 @@ use std::collections::BTreeMap;
 const KEPT_SHARE: f64 = 0.25;
 /// The gradients over which the rate of a descent is measured.
 const RATE_GRADIENTS: u64 = 60;
+/// The factor of earlier blocks in the mean rate of the best point's descent: descents gain unevenly.
+const BLOCK_MEMORY: f64 = 0.75;
 /// The gradients within which a challenger has to overtake the best point at its present rate.
 const CATCH_UP_GRADIENTS: f64 = 200.0;
 /// The gain by gradient that a race is expected to have before there was one, and the gradients that
@@ -51,7 +54,7 @@ pub(super) fn relative_gain(before: f64, after: f64) -> f64 {
 }
 
 /// A gain and the gradients that it took.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 struct GainRate {
     gain: f64,
     gradients: f64,
@@ -67,8 +70,12 @@ impl GainRate {
     }
 
     fn add(&mut self, gain: f64, gradients: f64) {
-        self.gain = MEMORY * self.gain + gain;
-        self.gradients = MEMORY * self.gradients + gradients;
+        self.add_remembering(MEMORY, gain, gradients);
+    }
+
+    fn add_remembering(&mut self, memory: f64, gain: f64, gradients: f64) {
+        self.gain = memory * self.gain + gain;
+        self.gradients = memory * self.gradients + gradients;
     }
 }
 
@@ -90,6 +97,9 @@ struct DescentRate {
     /// The gradients and the loss at the start of the block.
     gradients: u64,
     loss: f64,
+    /// The blocks before, the later ones counting more.
+    #[serde(default)]
+    earlier: GainRate,
 }
 
 /// The changes with which the trials of a race begin.
@@ -142,7 +152,7 @@ impl Race {
     pub(super) fn new(loss: f64) -> Self {
         Self {
             stage: RaceStage::Best,
-            block: DescentRate { gradients: 0, loss },
+            block: DescentRate { gradients: 0, loss, earlier: GainRate::default() },
             best_rate: 0.0,
             winner: None,
             gradients: 0,
@@ -197,18 +207,27 @@ impl Race {
 
     /// Begins to measure a descent.
     pub(super) fn measure_from(&mut self, gradients: u64, loss: f64) {
-        self.block = DescentRate { gradients, loss };
+        self.block = DescentRate { gradients, loss, earlier: GainRate::default() };
     }
 
-    /// The rate of a descent at the end of a block; `None` within one.
-    pub(super) fn measured(&mut self, gradients: u64, loss: f64) -> Option<f64> {
+    /// The rate of a descent at the end of a block, and the larger one of it and of the mean of the blocks
+    /// up to it; `None` within a block.
+    pub(super) fn measured(&mut self, gradients: u64, loss: f64) -> Option<[f64; 2]> {
         let used = gradients.saturating_sub(self.block.gradients);
         let gain = relative_gain(self.block.loss, loss);
         if used < RATE_GRADIENTS {
             return None;
         }
-        self.measure_from(gradients, loss);
-        Some(gain / used as f64)
+        let mut blocks = self.block.earlier;
+        blocks.add_remembering(BLOCK_MEMORY, gain, used as f64);
+        self.block = DescentRate { gradients, loss, earlier: blocks };
+        let rate = gain / used as f64;
+        Some([rate, rate.max(blocks.value())])
+    }
+
+    /// The gradients of a move: a challenger is judged after every block.
+    pub(super) fn longest_move(&self) -> u64 {
+        if matches!(self.stage, RaceStage::Challenger(_)) { RATE_GRADIENTS } else { u64::MAX }
     }
 
     /// True if a descent at this rate may overtake the best point soon.
@@ -295,6 +314,22 @@ mod tests {
         }
         assert!(race.rate(mutants) < race.rate(displaced));
         assert!(race.required_rate(mutants) >= LEAST_RATE);
+    }
+
+    #[test]
+    fn one_slow_block_does_not_make_a_descent_slow() {
+        let mut race = Race::new(1.0);
+        assert_eq!(race.measured(RATE_GRADIENTS - 1, 0.5), None);
+        let [fast, mean] = race.measured(RATE_GRADIENTS, 0.5).unwrap();
+        assert_eq!(fast, mean);
+        let [slow, mean] = race.measured(2 * RATE_GRADIENTS, 0.5).unwrap();
+        assert_eq!(slow, 0.0);
+        assert!(mean > 0.4 * fast && mean < fast);
+        let blocks = (3..20).map(|block| race.measured(block * RATE_GRADIENTS, 0.5).unwrap());
+        assert!(blocks.last().is_some_and(|[_, mean]| mean < 0.01 * fast));
+        race.measure_from(0, 0.5);
+        let of_another = race.measured(RATE_GRADIENTS, 0.25).unwrap();
+        assert_eq!(of_another, [fast, fast]);
     }
 
     #[test]

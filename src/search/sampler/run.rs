@@ -285,6 +285,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         let SearchSettings { method, gradients, .. } = self.settings;
         let limit = gradients.filter(|_| method != SearchMethod::BruteForce);
         let left = limit.map_or(u64::MAX, |limit| limit.saturating_sub(self.statistics.gradients));
+        let left = left.min(self.race.as_ref().map_or(u64::MAX, Race::longest_move));
         let active = self.active_chains();
         let count = active.iter().filter(|active| **active).count().max(1) as u64;
         let share = |i: u64| left / count + u64::from(i < left % count);
