@@ -4,6 +4,7 @@ use super::constrained::{LimitedTrustRegion, scaled_room};
 use super::kink::KinkTrial;
 use super::limit_values::{LimitValues, LimitedPoint};
 use super::quadratic_program::QuadraticProgram;
+use super::shortest_change::shortest_change;
 use super::trust_region::HessianModel;
 use nalgebra::{DMatrix, DVector};
 
@@ -19,7 +20,19 @@ impl LimitedTrustRegion {
     /// The smallest change, in the scales of the parameters, after which limits hold by their
     /// derivatives as far as they can.
     pub fn correction(&self, limits: &LimitValues, room: &[[f64; 2]]) -> Option<DVector<f64>> {
-        let count = self.region.scales.len();
+        let scales = &self.region.scales;
+        let rows = self.effective_rows(limits);
+        let distance = distance(limits, &rows);
+        if !(distance > 0.0 && distance.is_finite()) {
+            return None;
+        }
+        let bounds = limits.room(&limits.values);
+        let is_near = |change: &DVector<f64>| change.norm() <= CORRECTION_REACH[0] * distance;
+        let shortest = shortest_change(&rows, &bounds, &scaled_room(room, scales));
+        if let Some(change) = shortest.filter(is_near) {
+            return Some(change.component_div(scales));
+        }
+        let count = scales.len();
         self.nearest(limits, room, &DMatrix::identity(count, count), &DVector::zeros(count))
     }
 
