@@ -189,7 +189,7 @@ fn a_search_is_requested_with_the_settings_of_the_panel() {
     press(&mut harness, "minutes");
     press(&mut harness, "Search");
     let quest = started(&harness);
-    assert_eq!(quest.plan.settings.method, SearchMethod::Restore);
+    assert_eq!(quest.plan.settings.method, SearchMethod::IteratedLocalSearch);
     assert!(!quest.plan.rules.projection && !quest.free);
     assert!(quest.open.is_some() && quest.minutes.is_some());
     assert!(quest.plan.settings.gradients.is_none(), "nothing but a person ends it");

@@ -65,12 +65,12 @@ fn a_checkpoint_of_another_search_is_refused() {
     );
     assert_eq!(again["gradients_in_all"], 40);
     assert!(done(&base, "").contains("nothing to do: 40 of 40"));
-    let sampler = [&base[..], &["--method", "iterated"]].concat();
+    let sampler = [&base[..], &["--method", "restore"]].concat();
     refused(
         2,
         &sampler,
         "",
-        &["another search", "method is \"restore\" there and \"iterated\" here"],
+        &["another search", "method is \"iterated\" there and \"restore\" here"],
     );
     let more = [&base[..], &["--seed", "9"]].concat();
     refused(2, &more, "", &["another search", "settings.seed is 1 there and 9 here"]);

@@ -44,7 +44,7 @@ pub(super) struct SearchArgs {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// The sampler; absent: restore, or that of the checkpoint if there is one
+    /// The sampler; absent: iterated, or that of the checkpoint if there is one
     #[arg(long, value_enum)]
     method: Option<SearchMethod>,
 
