@@ -2,8 +2,9 @@
 //!
 //! A descent counts limits as penalties until it gains little, and keeps them as constraints from there on: a
 //! minimum often lies where a limit turns sharply, which penalties approach without an end. It ends at a
-//! minimum when the optimizer says so, with rays found anew: the gradient has vanished, or nothing can be
-//! gained at the tolerance of the spots, and every limit is kept to 1e-9 of its unit.
+//! minimum when the optimizer says so (the gradient has vanished, or nothing can be gained at the tolerance of
+//! the spots, and every limit is kept to 1e-9 of its unit) and another descent from there, with rays found anew,
+//! says so too and gains less than the distance below which two minima are the same.
 //!
 //! Two minima are the same if the signs of their curvatures and powers are, and if they are near in the
 //! metric of the residuals: `d² = dxᵀ Jᵀ J dx / F` predicts the relative change of the merit between
@@ -12,8 +13,12 @@
 use super::timing::Stopwatch;
 use crate::lens::Lens;
 use crate::merit::{DerivativeLevel, Merit, MeritError};
-use crate::optimize::{DescentMethod, DescentState, OptimizationProgress, Optimizer, start_from};
-use crate::search::lens_landscape::{LensLandscape, SearchPlan, SearchSetupError, curvature_signs};
+use crate::optimize::{
+    DescentMethod, DescentState, OptimizationEnd, OptimizationProgress, Optimizer, start_from,
+};
+use crate::search::lens_landscape::{
+    DescentSettings, LensLandscape, SearchPlan, SearchSetupError, curvature_signs, gains_little,
+};
 use crate::search::{Landscape as _, Random};
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng as _;
@@ -25,8 +30,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The evaluations after which a descent that has not ended is given up.
 const MOST_EVALUATIONS: usize = 1000;
-/// The relative gain of a move by penalties below which the limits are kept.
-const SMALL_GAIN: f64 = 0.1;
 /// The starts between two looks at the flag.
 const BATCH: u64 = 32;
 /// The parts of the way from the lens to random numbers that are tried: of many surfaces few random ones
@@ -113,15 +116,17 @@ pub fn count_minima(
     starts: u64,
     stop: &AtomicBool,
 ) -> Result<MinimaCount, SearchSetupError> {
+    let local = DescentSettings { method: DescentMethod::TrustRegion, ..plan.local.clone() };
+    let plan = &SearchPlan { local, ..plan.clone() };
     let landscape = plan.landscape(lens)?;
-    let (watch, tolerance) = (Stopwatch::start(), plan.local.tolerance);
+    let watch = Stopwatch::start();
     let mut families: BTreeMap<String, Vec<Minimum>> = BTreeMap::new();
     let (mut begun, mut lost, mut unfinished, mut stuck) = (0, 0, 0, 0);
     let (mut ended, mut evaluations) = (0, 0);
     while begun < starts && !stop.load(Ordering::Relaxed) {
         let batch = begun..(begun + BATCH).min(starts);
         begun = batch.end;
-        let descend = |start| descend(&landscape, plan.settings.seed, start, tolerance);
+        let descend = |start| descend(&landscape, plan.settings.seed, start);
         let ends: Vec<(DescentEnd, usize)> = batch.into_par_iter().map(descend).collect();
         for (end, used) in ends {
             evaluations += used;
@@ -163,32 +168,42 @@ pub fn count_minima(
 }
 
 /// A descent from a random lens, with the number of its evaluations.
-fn descend(
-    landscape: &LensLandscape,
-    seed: u64,
-    start: u64,
-    tolerance: f64,
-) -> (DescentEnd, usize) {
+fn descend(landscape: &LensLandscape, seed: u64, start: u64) -> (DescentEnd, usize) {
     // Each start has random numbers of its own, whatever thread it is on.
     let mut random = Random::seed_from_u64(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ start);
     let drawn = SPREADS.iter().find_map(|spread| landscape.draw_near(*spread, &mut random));
     let Some(drawn) = drawn else { return (DescentEnd::Lost, 0) };
     let (lens, used) = approach(landscape, drawn);
     let Some(lens) = lens else { return (DescentEnd::Lost, used) };
-    let optimizer = landscape.constrained_merit(&lens).and_then(|merit| {
-        let free = landscape.with_variables(&lens);
-        start_from(DescentMethod::TrustRegion, merit, &free, tolerance)
-    });
-    let Ok(optimizer) = optimizer else { return (DescentEnd::Lost, used) };
-    let (halted, last) = run(optimizer, MOST_EVALUATIONS.saturating_sub(used));
-    let used = used + last.evaluations;
-    let end = match last.end {
-        None => DescentEnd::Unfinished,
-        Some(end) if end.is_minimum() => EndedDescent::new(landscape, &halted, tolerance)
-            .map_or(DescentEnd::Lost, |found| DescentEnd::Minimum(Box::new(found))),
-        Some(_) => DescentEnd::Stuck,
-    };
-    (end, used)
+    finish(landscape, &lens, used)
+}
+
+/// A descent within the limits, again and again with rays found anew until one gains little; with the number
+/// of evaluations in all.
+fn finish(landscape: &LensLandscape, lens: &Lens, mut used: usize) -> (DescentEnd, usize) {
+    let tolerance = landscape.tolerance();
+    let (mut at, mut before) = (lens.clone(), f64::INFINITY);
+    loop {
+        let optimizer = landscape.constrained_merit(&at).and_then(|merit| {
+            let free = landscape.with_variables(&at);
+            start_from(DescentMethod::TrustRegion, merit, &free, tolerance)
+        });
+        let Ok(optimizer) = optimizer else { return (DescentEnd::Lost, used) };
+        let (mut halted, last) = run(optimizer, MOST_EVALUATIONS.saturating_sub(used));
+        used += last.evaluations;
+        let Some(end) = last.end else { return (DescentEnd::Unfinished, used) };
+        let gains_nothing = last.best >= (1.0 - SAME) * before;
+        if gains_nothing && end.is_minimum() {
+            let found = EndedDescent::new(landscape, &halted, tolerance);
+            let end = found.map_or(DescentEnd::Lost, |found| DescentEnd::Minimum(Box::new(found)));
+            return (end, used);
+        }
+        if gains_nothing || end == OptimizationEnd::Conflict {
+            return (DescentEnd::Stuck, used);
+        }
+        halted.variables.clone_from(&lens.variables);
+        (at, before) = (halted, last.best);
+    }
 }
 
 /// A lens after moves by penalties until one gains little, `None` if it has lost the light; and their
@@ -202,7 +217,7 @@ fn approach(landscape: &LensLandscape, start: Arc<Lens>) -> (Option<Arc<Lens>>, 
         if !loss.is_finite() {
             return (None, used);
         }
-        if loss > (1.0 - SMALL_GAIN) * before {
+        if gains_little(before, loss) {
             break;
         }
         before = loss;

@@ -31,7 +31,7 @@ impl LinearLimit {
 }
 
 /// A limit that is met as an equality.
-struct MetLimit<'a> {
+struct ActiveLimit<'a> {
     limit: &'a LinearLimit,
     target: f64,
     /// The sign of the multiplier by which the limit holds the change back.
@@ -49,21 +49,21 @@ pub(super) fn shortest_change(
     let mut change = DVector::zeros(rows.ncols());
     let distances = limits.iter().map(|limit| limit.distance(&change).abs());
     let rounding = ROUNDING * distances.fold(0.0, f64::max);
-    let mut met: Vec<MetLimit<'_>> = Vec::new();
+    let mut active: Vec<ActiveLimit<'_>> = Vec::new();
     for _ in 0..ROUNDS {
-        let before = met.len();
+        let before = active.len();
         for limit in &limits {
             let distance = limit.distance(&change);
-            let is_met = met.iter().any(|met| std::ptr::eq(met.limit, limit));
-            if distance.abs() > rounding && !is_met {
+            let is_active = active.iter().any(|one| std::ptr::eq(one.limit, limit));
+            if distance.abs() > rounding && !is_active {
                 let target = limit.direction.dot(&change) + distance;
-                met.push(MetLimit { limit, target, sign: distance.signum() });
+                active.push(ActiveLimit { limit, target, sign: distance.signum() });
             }
         }
-        if met.len() == before {
+        if active.len() == before {
             return Some(change);
         }
-        change = shortest_to(&met, rows.ncols())?;
+        change = shortest_meeting(&active, rows.ncols())?;
     }
     None
 }
@@ -89,19 +89,19 @@ fn linear_limits(rows: &DMatrix<f64>, bounds: &[[f64; 2]], room: &[[f64; 2]]) ->
 
 /// The shortest change that meets limits as equalities; `None` if they depend on one another, or if a shorter
 /// change would keep one of them without meeting it.
-fn shortest_to(met: &[MetLimit<'_>], count: usize) -> Option<DVector<f64>> {
-    let directions = DMatrix::from_fn(met.len(), count, |i, j| met[i].limit.direction[j]);
-    let targets = DVector::from_iterator(met.len(), met.iter().map(|met| met.target));
+fn shortest_meeting(active: &[ActiveLimit<'_>], count: usize) -> Option<DVector<f64>> {
+    let directions = DMatrix::from_fn(active.len(), count, |i, j| active[i].limit.direction[j]);
+    let targets = DVector::from_iterator(active.len(), active.iter().map(|one| one.target));
     let factor = (&directions * directions.transpose()).cholesky()?;
     let smallest = factor.l_dirty().diagonal().min();
     if !(smallest > SMALLEST_PIVOT) {
         return None;
     }
     let multipliers = factor.solve(&targets);
-    let holds = |(met, multiplier): (&MetLimit<'_>, &f64)| {
-        met.limit.is_equality() || met.sign * multiplier >= 0.0
+    let holds = |(one, multiplier): (&ActiveLimit<'_>, &f64)| {
+        one.limit.is_equality() || one.sign * multiplier >= 0.0
     };
-    let is_shortest = met.iter().zip(multipliers.iter()).all(holds);
+    let is_shortest = active.iter().zip(multipliers.iter()).all(holds);
     is_shortest.then(|| directions.tr_mul(&multipliers))
 }
 

@@ -104,15 +104,15 @@ pub(in crate::cli) struct SearchPlanArgs {
     #[arg(long, value_name = "N")]
     pub(in crate::cli) reservoir: Option<usize>,
 
-    /// Temperature, 0 or more, or `infinite`; absent: the density of the start is one half
+    /// Temperature of `restore` and `metropolis`, 0 or more, or `infinite`; absent: the density of the start is one half
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     temperature: Option<TemperatureArg>,
 
-    /// The rate at which descents end at random; the larger, the shorter they are
+    /// The rate at which descents of `restore` end at random; the larger, the shorter they are
     #[arg(long, value_name = "C", allow_negative_numbers = true)]
     c: Option<f64>,
 
-    /// The share of regenerations that draw a lens globally
+    /// The share of regenerations of `restore` that draw a lens globally
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     gamma: Option<f64>,
 

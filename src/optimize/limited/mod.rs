@@ -107,9 +107,8 @@ impl LimitedOptimizer {
         Ok(this)
     }
 
-    /// The same as a segment of a descent, after an earlier one, that takes so many evaluations at most. The
-    /// search that it is part of ends the descent: within the tolerance of the spots there is still something
-    /// to gain.
+    /// The same as a segment of a descent, after an earlier one, that takes so many evaluations at most and
+    /// ends later than a descent by itself: within the tolerance of the spots there is still something to gain.
     pub(super) fn into_segment(
         mut self,
         evaluations: usize,

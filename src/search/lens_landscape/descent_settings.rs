@@ -14,8 +14,8 @@ const MAX_STEPS: usize = 10_000;
 pub struct DescentSettings {
     /// The optimization method.
     pub method: DescentMethod,
-    /// The maximum number of steps of a local move; all methods but Adam take fewer if the move
-    /// converges.
+    /// The maximum number of steps of a local move by penalties; all methods but Adam take fewer if the move
+    /// converges. A move that keeps limits takes up to twelve times as many.
     pub steps: usize,
     /// The initial learning rate of Adam, in units in which a step of 1 changes the residuals by as
     /// much as they are.

@@ -17,16 +17,21 @@ use std::sync::Arc;
 /// The gain of a move relative to the loss below which the next one keeps the limits.
 const SLOW_GAIN: f64 = 0.1;
 /// The gradients of a move that keeps the limits, relative to the steps of other moves: its rays and
-/// corrections at the end take a part of them. Each move of a row of them is longer by as much as the first
-/// one, up to a multiple of it.
+/// corrections at the end take a part of them.
 const LIMITED_GRADIENTS: usize = 3;
-const LONGEST_MOVE: usize = 4;
+/// The most times as many as that in a later one of several such moves in a row.
+const LARGEST_MULTIPLE: usize = 4;
 /// The gradients below which a move does not keep the limits.
 const FEWEST_GRADIENTS: usize = 20;
 /// The number of such moves in a descent that may fail.
 const FAILURES: usize = 3;
 /// The relative increase of the loss that a move may make, since the rays of two lenses differ.
 const SLACK: f64 = 0.05;
+
+/// True if a move by penalties from one loss to another gains so little that limits are to be kept from there on.
+pub fn gains_little(before: f64, loss: f64) -> bool {
+    loss >= (1.0 - SLOW_GAIN) * before
+}
 
 /// The end of a local move.
 #[derive(Debug)]
@@ -51,7 +56,7 @@ impl LensLandscape {
             return self.limited_move(lens, memory, most);
         }
         let (before, moved) = self.penalized_move(lens, memory, most)?;
-        let is_slow = moved.loss >= (1.0 - SLOW_GAIN) * before;
+        let is_slow = gains_little(before, moved.loss);
         memory.keeps_limits = is_slow
             && !memory.penalties_only
             && self.local.method == DescentMethod::TrustRegion
@@ -71,7 +76,7 @@ impl LensLandscape {
     ) -> Result<LocalMove, MeritError> {
         let before = self.evaluate(lens)?;
         let tolerance = self.local.tolerance;
-        let multiple = (memory.limited_segments + 1).min(LONGEST_MOVE);
+        let multiple = (memory.limited_segments + 1).min(LARGEST_MULTIPLE);
         let evaluations = (multiple * LIMITED_GRADIENTS * self.local.steps).min(most);
         let asked = LimitedSegment { evaluations, tolerance };
         let free = self.with_variables(lens);
@@ -84,7 +89,9 @@ impl LensLandscape {
         if let Ok((there, loss)) = moved
             && loss < (1.0 + SLACK) * before
         {
-            memory.has_ended = has_ended;
+            // The first segment began where limits were broken, by which its end is judged: the next one has
+            // to end too.
+            memory.has_ended = has_ended && memory.limited_segments > 0;
             memory.limited_segments += 1;
             return Ok(LocalMove { lens: there, loss, gradients });
         }

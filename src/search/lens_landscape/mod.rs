@@ -25,6 +25,7 @@ mod violations;
 pub use aspheres::AsphereGain;
 pub use descent_settings::DescentSettings;
 pub use finalize::{CrossCheck, FinalizedLens, GlassSubstitution, UnlistedGlass, finalize};
+pub use local_move::gains_little;
 pub use minimum::{curvature_signs, has_same_glasses};
 pub use open_apertures::with_open_apertures;
 pub use plan::{SearchPlan, SearchSetupError, describe_left_out, run};
@@ -227,6 +228,11 @@ impl LensLandscape {
             &self.rules,
             self.variable_rules,
         )
+    }
+
+    /// The relative tolerance of spot radii in local moves.
+    pub fn tolerance(&self) -> f64 {
+        self.local.tolerance
     }
 
     /// The merit function of a lens of any structure, with a relative tolerance of spot radii and

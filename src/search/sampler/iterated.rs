@@ -79,6 +79,11 @@ impl<L: Landscape> RoundContext<'_, L> {
     }
 }
 
+/// True if a descent has ended by itself at the best of its points.
+fn has_ended<L: Landscape>(descent: &ChainDescent<L::Point, L::Memory>, landscape: &L) -> bool {
+    descent.point == descent.best && landscape.has_ended(&descent.memory)
+}
+
 impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     /// For each chain, true if it takes a turn in the next round.
     pub(super) fn active_chains(&self) -> Vec<bool> {
@@ -219,11 +224,9 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             descent.memory = M::default();
         }
         let is_outside = landscape.structure_violation(&descent.best) > 0;
-        let has_ended = is_lost || is_outside || landscape.has_ended(&descent.memory);
-        let ended = has_ended.then_some([0.0; 2]);
-        let Some([_, rate]) = ended.or_else(|| race.measured(gradients, loss)) else {
-            return false;
-        };
+        let ended = is_lost || is_outside || has_ended(descent, landscape);
+        let measured = || race.measured(gradients, loss).map(|rates| rates.recent);
+        let Some(rate) = ended.then_some(0.0).or_else(measured) else { return false };
         race.best_rate = rate;
         rate <= self.required_rate(race, landscape)
     }
@@ -329,6 +332,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     ) where
         L: Landscape<Point = P, Memory = M>,
     {
+        let ended = self.chains[chain].descent.as_ref().is_some_and(|d| has_ended(d, landscape));
         if self.try_overtaking(race, chain, landscape, events) {
             return;
         }
@@ -338,10 +342,9 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         };
         let (gradients, loss) = (descent.gradients, descent.best_loss);
         let mut end = DescentEnd::InfiniteLoss;
-        if descent.loss.is_finite() && landscape.has_ended(&descent.memory) {
-            end = DescentEnd::Unpromising;
-        } else if descent.loss.is_finite() {
-            let Some([rate, _]) = race.measured(gradients, loss) else { return };
+        if descent.loss.is_finite() {
+            let measured = || race.measured(gradients, loss).map(|rates| rates.last);
+            let Some(rate) = ended.then_some(0.0).or_else(measured) else { return };
             // A better loss with a structure farther from the permitted ones never overtakes.
             if loss > best && Race::may_catch_up(loss, best, rate) {
                 return;

@@ -9,7 +9,7 @@
 //! from the start.
 //!
 //! Whatever gains fastest comes next: a descent goes on for as long as it gains faster than trials do on
-//! average, by its last block of gradients or by the mean of the last few, and of the ways to make trials
+//! average, by its last block of gradients or by the mean of the last few, and has not ended; of the ways to make trials
 //! that with the largest gain by gradient so far follows it. This maximizes the gain for a budget (Charnov,
 //! "Optimal Foraging, the Marginal Value Theorem", 1976). Kinds of mutation are drawn in proportion to their
 //! gain by gradient.
@@ -23,7 +23,7 @@ const KEPT_SHARE: f64 = 0.25;
 /// The gradients over which the rate of a descent is measured.
 const RATE_GRADIENTS: u64 = 60;
 /// The factor of earlier blocks in the mean rate of the best point's descent: descents gain unevenly.
-const BLOCK_MEMORY: f64 = 0.75;
+const BLOCK_DECAY: f64 = 0.75;
 /// The gradients within which a challenger has to overtake the best point at its present rate.
 const CATCH_UP_GRADIENTS: f64 = 200.0;
 /// The gain by gradient that a race is expected to have before there was one, and the gradients that
@@ -70,12 +70,12 @@ impl GainRate {
     }
 
     fn add(&mut self, gain: f64, gradients: f64) {
-        self.add_remembering(MEMORY, gain, gradients);
+        self.add_with_decay(MEMORY, gain, gradients);
     }
 
-    fn add_remembering(&mut self, memory: f64, gain: f64, gradients: f64) {
-        self.gain = memory * self.gain + gain;
-        self.gradients = memory * self.gradients + gradients;
+    fn add_with_decay(&mut self, decay: f64, gain: f64, gradients: f64) {
+        self.gain = decay * self.gain + gain;
+        self.gradients = decay * self.gradients + gradients;
     }
 }
 
@@ -100,6 +100,15 @@ struct DescentRate {
     /// The blocks before, the later ones counting more.
     #[serde(default)]
     earlier: GainRate,
+}
+
+/// The gain by gradient at the end of a block.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct BlockRates {
+    /// In the block itself.
+    pub(super) last: f64,
+    /// The larger one of that and of the mean of the last blocks.
+    pub(super) recent: f64,
 }
 
 /// The changes with which the trials of a race begin.
@@ -210,22 +219,21 @@ impl Race {
         self.block = DescentRate { gradients, loss, earlier: GainRate::default() };
     }
 
-    /// The rate of a descent at the end of a block, and the larger one of it and of the mean of the blocks
-    /// up to it; `None` within a block.
-    pub(super) fn measured(&mut self, gradients: u64, loss: f64) -> Option<[f64; 2]> {
+    /// The rates of a descent at the end of a block; `None` within one.
+    pub(super) fn measured(&mut self, gradients: u64, loss: f64) -> Option<BlockRates> {
         let used = gradients.saturating_sub(self.block.gradients);
         let gain = relative_gain(self.block.loss, loss);
         if used < RATE_GRADIENTS {
             return None;
         }
         let mut blocks = self.block.earlier;
-        blocks.add_remembering(BLOCK_MEMORY, gain, used as f64);
+        blocks.add_with_decay(BLOCK_DECAY, gain, used as f64);
         self.block = DescentRate { gradients, loss, earlier: blocks };
-        let rate = gain / used as f64;
-        Some([rate, rate.max(blocks.value())])
+        let last = gain / used as f64;
+        Some(BlockRates { last, recent: last.max(blocks.value()) })
     }
 
-    /// The gradients of a move: a challenger is judged after every block.
+    /// The most gradients of a move: a challenger is judged after one or two moves.
     pub(super) fn longest_move(&self) -> u64 {
         if matches!(self.stage, RaceStage::Challenger(_)) { RATE_GRADIENTS } else { u64::MAX }
     }
@@ -320,16 +328,15 @@ mod tests {
     fn one_slow_block_does_not_make_a_descent_slow() {
         let mut race = Race::new(1.0);
         assert_eq!(race.measured(RATE_GRADIENTS - 1, 0.5), None);
-        let [fast, mean] = race.measured(RATE_GRADIENTS, 0.5).unwrap();
-        assert_eq!(fast, mean);
-        let [slow, mean] = race.measured(2 * RATE_GRADIENTS, 0.5).unwrap();
-        assert_eq!(slow, 0.0);
-        assert!(mean > 0.4 * fast && mean < fast);
+        let fast = race.measured(RATE_GRADIENTS, 0.5).unwrap();
+        assert_eq!(fast.last, fast.recent);
+        let slow = race.measured(2 * RATE_GRADIENTS, 0.5).unwrap();
+        assert_eq!(slow.last, 0.0);
+        assert!(slow.recent > 0.4 * fast.last && slow.recent < fast.last);
         let blocks = (3..20).map(|block| race.measured(block * RATE_GRADIENTS, 0.5).unwrap());
-        assert!(blocks.last().is_some_and(|[_, mean]| mean < 0.01 * fast));
+        assert!(blocks.last().is_some_and(|rates| rates.recent < 0.01 * fast.last));
         race.measure_from(0, 0.5);
-        let of_another = race.measured(RATE_GRADIENTS, 0.25).unwrap();
-        assert_eq!(of_another, [fast, fast]);
+        assert_eq!(race.measured(RATE_GRADIENTS, 0.25), Some(fast));
     }
 
     #[test]
