@@ -1,6 +1,6 @@
 //! The shortest change under linear limits: the limits that are broken are taken as equalities, and those
-//! that the change would break are added, until all hold. A few limits are solved for so, at a hundredth of
-//! the time of a quadratic program; where limits depend on one another nothing is returned.
+//! that the change would break are added, until all hold. A few limits are solved for so without a quadratic
+//! program; where limits depend on one another nothing is returned.
 
 use nalgebra::{DMatrix, DVector};
 
