@@ -54,6 +54,9 @@ pub struct DescentState {
     /// True if limits are penalties to the end of the descent.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub penalties_only: bool,
+    /// True if later segments that keep the limits may be longer.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub allows_long_segments: bool,
     /// The number of segments in a row so far that kept the limits.
     #[serde(default)]
     pub limited_segments: usize,

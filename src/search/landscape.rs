@@ -51,6 +51,10 @@ pub trait Landscape: Sync {
         false
     }
 
+    /// Allows longer moves from here on, for a descent that nothing else waits for; by default moves keep
+    /// their length.
+    fn allow_long_moves(&self, _memory: &mut Self::Memory) {}
+
     /// A random point: `p_global` of (4.14).
     fn draw(&self, random: &mut Random) -> Result<Self::Point, MutationError>;
 

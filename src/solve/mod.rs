@@ -18,7 +18,6 @@ mod projection;
 mod quadratic_program;
 mod restoration;
 mod separate;
-mod shortest_change;
 mod trust_region;
 
 pub use adam::{Adam, AdamMoments};

@@ -19,7 +19,7 @@ const SLOW_GAIN: f64 = 0.1;
 /// The gradients of a move that keeps the limits, relative to the steps of other moves: its rays and
 /// corrections at the end take a part of them.
 const LIMITED_GRADIENTS: usize = 3;
-/// The most times as many as that in a later one of several such moves in a row.
+/// The most times as many as that in a later one of several such moves in a row, where long moves are allowed.
 const LARGEST_MULTIPLE: usize = 4;
 /// The gradients below which a move does not keep the limits.
 const FEWEST_GRADIENTS: usize = 20;
@@ -76,7 +76,8 @@ impl LensLandscape {
     ) -> Result<LocalMove, MeritError> {
         let before = self.evaluate(lens)?;
         let tolerance = self.local.tolerance;
-        let multiple = (memory.limited_segments + 1).min(LARGEST_MULTIPLE);
+        let longest = if memory.allows_long_segments { LARGEST_MULTIPLE } else { 1 };
+        let multiple = (memory.limited_segments + 1).min(longest);
         let evaluations = (multiple * LIMITED_GRADIENTS * self.local.steps).min(most);
         let asked = LimitedSegment { evaluations, tolerance };
         let free = self.with_variables(lens);

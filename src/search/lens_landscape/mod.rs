@@ -324,6 +324,10 @@ impl Landscape for LensLandscape {
         memory.has_ended
     }
 
+    fn allow_long_moves(&self, memory: &mut DescentState) {
+        memory.allows_long_segments = true;
+    }
+
     fn draw(&self, random: &mut Random) -> Result<Arc<Lens>, MutationError> {
         let none = || MutationError::new(MutationKind::Global, Refusal::NoRandomLens);
         self.draw_near(1.0, random).ok_or_else(none)

@@ -216,6 +216,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         L: Landscape<Point = P, Memory = M>,
     {
         let Some(descent) = &mut self.chains[0].descent else { return false };
+        landscape.allow_long_moves(&mut descent.memory);
         let (gradients, loss) = (descent.gradients, descent.best_loss);
         let is_lost = !descent.loss.is_finite();
         if is_lost {

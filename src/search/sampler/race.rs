@@ -22,8 +22,8 @@ use std::collections::BTreeMap;
 const KEPT_SHARE: f64 = 0.25;
 /// The gradients over which the rate of a descent is measured.
 const RATE_GRADIENTS: u64 = 60;
-/// The factor of earlier blocks in the mean rate of the best point's descent: descents gain unevenly.
-const BLOCK_DECAY: f64 = 0.75;
+/// The number of last blocks over which the best point's descent has to gain little: descents gain unevenly.
+const RECENT_BLOCKS: usize = 3;
 /// The gradients within which a challenger has to overtake the best point at its present rate.
 const CATCH_UP_GRADIENTS: f64 = 200.0;
 /// The gain by gradient that a race is expected to have before there was one, and the gradients that
@@ -54,7 +54,7 @@ pub(super) fn relative_gain(before: f64, after: f64) -> f64 {
 }
 
 /// A gain and the gradients that it took.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct GainRate {
     gain: f64,
     gradients: f64,
@@ -70,12 +70,8 @@ impl GainRate {
     }
 
     fn add(&mut self, gain: f64, gradients: f64) {
-        self.add_with_decay(MEMORY, gain, gradients);
-    }
-
-    fn add_with_decay(&mut self, decay: f64, gain: f64, gradients: f64) {
-        self.gain = decay * self.gain + gain;
-        self.gradients = decay * self.gradients + gradients;
+        self.gain = MEMORY * self.gain + gain;
+        self.gradients = MEMORY * self.gradients + gradients;
     }
 }
 
@@ -92,14 +88,14 @@ pub(super) enum RaceStage {
 }
 
 /// The rate of a descent that runs alone, measured in blocks of gradients.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct DescentRate {
     /// The gradients and the loss at the start of the block.
     gradients: u64,
     loss: f64,
-    /// The blocks before, the later ones counting more.
+    /// The last blocks before.
     #[serde(default)]
-    earlier: GainRate,
+    earlier: Vec<GainRate>,
 }
 
 /// The gain by gradient at the end of a block.
@@ -161,7 +157,7 @@ impl Race {
     pub(super) fn new(loss: f64) -> Self {
         Self {
             stage: RaceStage::Best,
-            block: DescentRate { gradients: 0, loss, earlier: GainRate::default() },
+            block: DescentRate { gradients: 0, loss, earlier: Vec::new() },
             best_rate: 0.0,
             winner: None,
             gradients: 0,
@@ -216,7 +212,7 @@ impl Race {
 
     /// Begins to measure a descent.
     pub(super) fn measure_from(&mut self, gradients: u64, loss: f64) {
-        self.block = DescentRate { gradients, loss, earlier: GainRate::default() };
+        self.block = DescentRate { gradients, loss, earlier: Vec::new() };
     }
 
     /// The rates of a descent at the end of a block; `None` within one.
@@ -226,16 +222,15 @@ impl Race {
         if used < RATE_GRADIENTS {
             return None;
         }
-        let mut blocks = self.block.earlier;
-        blocks.add_with_decay(BLOCK_DECAY, gain, used as f64);
-        self.block = DescentRate { gradients, loss, earlier: blocks };
-        let last = gain / used as f64;
-        Some(BlockRates { last, recent: last.max(blocks.value()) })
-    }
-
-    /// The most gradients of a move: a challenger is judged after one or two moves.
-    pub(super) fn longest_move(&self) -> u64 {
-        if matches!(self.stage, RaceStage::Challenger(_)) { RATE_GRADIENTS } else { u64::MAX }
+        let block = GainRate { gain, gradients: used as f64 };
+        let mut blocks = std::mem::take(&mut self.block.earlier);
+        blocks.push(block);
+        let sum = |part: fn(&GainRate) -> f64| blocks.iter().map(part).sum::<f64>();
+        let mean = sum(|block| block.gain) / sum(|block| block.gradients);
+        let kept = blocks.len().saturating_sub(RECENT_BLOCKS - 1);
+        self.block = DescentRate { gradients, loss, earlier: blocks.split_off(kept) };
+        let last = block.value();
+        Some(BlockRates { last, recent: last.max(mean) })
     }
 
     /// True if a descent at this rate may overtake the best point soon.
@@ -333,8 +328,9 @@ mod tests {
         let slow = race.measured(2 * RATE_GRADIENTS, 0.5).unwrap();
         assert_eq!(slow.last, 0.0);
         assert!(slow.recent > 0.4 * fast.last && slow.recent < fast.last);
-        let blocks = (3..20).map(|block| race.measured(block * RATE_GRADIENTS, 0.5).unwrap());
-        assert!(blocks.last().is_some_and(|rates| rates.recent < 0.01 * fast.last));
+        let slower = race.measured(3 * RATE_GRADIENTS, 0.5).unwrap();
+        assert!(slower.recent > 0.3 * fast.last && slower.recent < slow.recent);
+        assert_eq!(race.measured(4 * RATE_GRADIENTS, 0.5).unwrap().recent, 0.0);
         race.measure_from(0, 0.5);
         assert_eq!(race.measured(RATE_GRADIENTS, 0.25), Some(fast));
     }

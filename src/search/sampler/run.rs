@@ -279,13 +279,12 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     }
 
     /// The gradient budget of each chain in its turn: for those that take one an equal part of the
-    /// remaining gradients, far more than a turn takes except in the last rounds, and in a race no more than
-    /// one move may take. Brute force has divided the gradients among its jobs.
+    /// remaining gradients, far more than a turn takes except in the last rounds. Brute force has divided the gradients
+    /// among its jobs.
     fn gradient_budgets(&self) -> Vec<usize> {
         let SearchSettings { method, gradients, .. } = self.settings;
         let limit = gradients.filter(|_| method != SearchMethod::BruteForce);
         let left = limit.map_or(u64::MAX, |limit| limit.saturating_sub(self.statistics.gradients));
-        let left = left.min(self.race.as_ref().map_or(u64::MAX, Race::longest_move));
         let active = self.active_chains();
         let count = active.iter().filter(|active| **active).count().max(1) as u64;
         let share = |i: u64| left / count + u64::from(i < left % count);

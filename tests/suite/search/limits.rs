@@ -45,24 +45,6 @@ fn a_descent_keeps_its_limits_once_it_gains_little() {
     assert!(kept > 3, "{kept} moves kept the limits");
 }
 
-/// A descent says that it has ended; what follows gains nothing.
-#[test]
-fn a_descent_within_limits_comes_to_an_end() {
-    let lens = bundled("singlet_la1131");
-    let landscape = plan(SearchRules::default()).landscape(&lens).unwrap();
-    let (mut at, mut memory) = (landscape.start().clone(), DescentState::default());
-    assert!(!landscape.has_ended(&memory));
-    let end = (0..20).find_map(|_| {
-        let (there, loss, _) = landscape.descend(&at, &mut memory);
-        at = there;
-        landscape.has_ended(&memory).then_some(loss)
-    });
-    let end = end.expect("an end within 20 moves");
-    assert!(landscape.limit_violation(&at).unwrap() <= 1e-9);
-    let (_, after, _) = landscape.descend(&at, &mut memory);
-    assert!(after > 0.999 * end, "{end:e} {after:e}");
-}
-
 /// The start breaks limits of its glass, of its air and of its track.
 #[test]
 fn a_search_from_outside_its_limits_retains_what_keeps_them() {
