@@ -54,9 +54,10 @@ pub struct DescentState {
     /// True if limits are penalties to the end of the descent.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub penalties_only: bool,
-    /// True if later segments that keep the limits may be longer.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub allows_long_segments: bool,
+    /// The most times as long as the first one that a later segment which keeps the limits may be; `None`: as
+    /// long.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub largest_multiple: Option<usize>,
     /// The number of segments in a row so far that kept the limits.
     #[serde(default)]
     pub limited_segments: usize,

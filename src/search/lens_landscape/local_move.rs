@@ -20,7 +20,7 @@ const SLOW_GAIN: f64 = 0.1;
 /// corrections at the end take a part of them.
 const LIMITED_GRADIENTS: usize = 3;
 /// The most times as many as that in a later one of several such moves in a row, where long moves are allowed.
-const LARGEST_MULTIPLE: usize = 4;
+pub(super) const LARGEST_MULTIPLE: usize = 4;
 /// The gradients below which a move does not keep the limits.
 const FEWEST_GRADIENTS: usize = 20;
 /// The number of such moves in a descent that may fail.
@@ -76,7 +76,7 @@ impl LensLandscape {
     ) -> Result<LocalMove, MeritError> {
         let before = self.evaluate(lens)?;
         let tolerance = self.local.tolerance;
-        let longest = if memory.allows_long_segments { LARGEST_MULTIPLE } else { 1 };
+        let longest = memory.largest_multiple.unwrap_or(1);
         let multiple = (memory.limited_segments + 1).min(longest);
         let evaluations = (multiple * LIMITED_GRADIENTS * self.local.steps).min(most);
         let asked = LimitedSegment { evaluations, tolerance };

@@ -325,7 +325,7 @@ impl Landscape for LensLandscape {
     }
 
     fn allow_long_moves(&self, memory: &mut DescentState) {
-        memory.allows_long_segments = true;
+        memory.largest_multiple = Some(local_move::LARGEST_MULTIPLE);
     }
 
     fn draw(&self, random: &mut Random) -> Result<Arc<Lens>, MutationError> {

@@ -12,8 +12,8 @@ const MAX_CHAINS: usize = 1024;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SearchSettings {
-    /// The search method; by default an iterated local search, which ends lower than the sampler of the thesis
-    /// at equal gradients.
+    /// The search method; by default an iterated local search. The sampler of the thesis is
+    /// [`SearchMethod::Restore`].
     pub method: SearchMethod,
     /// The seed of all random numbers of a run.
     pub seed: u64,
