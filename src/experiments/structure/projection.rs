@@ -2,8 +2,7 @@
 //!
 //! The fraction of iterations at which a search is at a lens better than its start, with projected
 //! mutations and without projection. Local steps are those of the thesis, by Adam: second-order steps
-//! recover nearly any mutant, projected or not. The fraction of
-//! mutants counts only iterations after a mutation, not the descent from the start with which every
+//! recover nearly any mutant, projected or not. The fraction of mutants counts only iterations after a mutation, not the descent from the start with which every
 //! search begins. The fractions of the thesis are listed as well; its steps differ, so that only
 //! the order of the two is compared.
 //!

@@ -19,6 +19,9 @@ const ROUNDS: usize = 3;
 
 impl LensLandscape {
     /// The merit function of a lens with the limits of the goal as constraints.
+    ///
+    /// # Errors
+    /// The lens has no merit.
     pub fn constrained_merit(&self, lens: &Lens) -> Result<Merit, MeritError> {
         let goal = Goal { limits: LimitTreatment::Constraints, ..self.goal.clone() };
         let merit = Merit::new(&self.with_variables(lens), &goal, self.local.tolerance)?;

@@ -9,10 +9,10 @@
 //! from the start.
 //!
 //! Whatever gains fastest comes next: a descent goes on for as long as it gains faster than trials do on
-//! average, by its last block of gradients or by the mean of the last few, and has not ended; of the ways to make trials
-//! that with the largest gain by gradient so far follows it. This maximizes the gain for a budget (Charnov,
-//! "Optimal Foraging, the Marginal Value Theorem", 1976). Kinds of mutation are drawn in proportion to their
-//! gain by gradient.
+//! average, by its last block of gradients or by the mean of the last few, and has not ended. Of the ways to
+//! make trials that with the largest gain by gradient so far follows it. This maximizes the gain for a budget
+//! (Charnov, "Optimal Foraging, the Marginal Value Theorem", 1976). Kinds of mutation are drawn in proportion
+//! to their gain by gradient.
 
 use crate::search::{MutationKind, MutationWeights};
 use serde::{Deserialize, Serialize};
