@@ -44,9 +44,10 @@ const STEPS: usize = 80;
 const WAY: f64 = 0.2;
 /// The frequency at which both are compared, in cycles/mm.
 const COMPARED: f64 = 4.0;
-/// The periods and the columns of a picture of moving bars.
+/// The periods, the columns and the rows of a picture of moving bars.
 const PERIODS: f64 = 2.0;
 const COLUMNS: usize = 48;
+const ROWS: usize = 16;
 /// The sampling error of pictures, and the difference from a prediction that is allowed.
 const SAMPLING: f64 = 0.01;
 const EQUAL: f64 = 0.02;
@@ -134,10 +135,9 @@ impl MovingShot {
     /// The contrast of moving bars in a picture of them, and its standard error; and the mean light.
     fn pictured(&self, seconds: f64, rays: &mut usize) -> ExperimentResult<[f64; 3]> {
         let width = PERIODS / COMPARED;
-        let rows = 4;
         let pitch = width / COLUMNS as f64;
-        let diagonal = Some(pitch * (COLUMNS as f64).hypot(rows as f64));
-        let frame = CameraFrame { pixels: [COLUMNS, rows], diagonal };
+        let diagonal = Some(pitch * (COLUMNS as f64).hypot(ROWS as f64));
+        let frame = CameraFrame { pixels: [COLUMNS, ROWS], diagonal };
         let wave = |scale: f64| Pattern::Wave {
             contrast: 1.0,
             frequency: [COMPARED * scale, 0.0],

@@ -12,15 +12,16 @@
 
 use super::timing::Stopwatch;
 use crate::lens::Lens;
-use crate::merit::{DerivativeLevel, Merit, MeritError};
+use crate::merit::MeritError;
 use crate::optimize::{
     DescentMethod, DescentState, OptimizationEnd, OptimizationProgress, Optimizer, start_from,
 };
 use crate::search::lens_landscape::{
-    DescentSettings, LensLandscape, SearchPlan, SearchSetupError, curvature_signs, gains_little,
+    DescentSettings, LensLandscape, MinimumPlace, SAME_MINIMUM, SearchPlan, SearchSetupError,
+    curvature_signs, gains_little,
 };
 use crate::search::{Landscape as _, Random};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use rand::SeedableRng as _;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -35,14 +36,6 @@ const BATCH: u64 = 32;
 /// The parts of the way from the lens to random numbers that are tried: of many surfaces few random ones
 /// form an image.
 const SPREADS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
-/// The square of the distance below which two minima are the same, and that above which they are not.
-const SAME: f64 = 1e-2;
-const DIFFERENT: f64 = 1.0;
-/// The relative height of a hill that parts two minima.
-const HILL: f64 = 1e-2;
-/// The places between two minima where the merit is evaluated.
-const BETWEEN: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
-
 /// The minima that descents from random lenses have found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MinimaCount {
@@ -96,13 +89,10 @@ enum DescentEnd {
     Minimum(Box<EndedDescent>),
 }
 
-/// A lens at a minimum, with its merit function.
+/// A lens at a minimum, with the signs of its curvatures and powers.
 struct EndedDescent {
-    merit: Merit,
     signs: String,
-    values: DVector<f64>,
-    normal: DMatrix<f64>,
-    value: f64,
+    place: MinimumPlace,
 }
 
 /// Counts the minima that descents from random lenses with the structure of a lens find. The same seed gives the same minima on any number of threads. Once
@@ -136,7 +126,7 @@ pub fn count_minima(
                 DescentEnd::Stuck => stuck += 1,
                 DescentEnd::Minimum(found) => {
                     ended += 1;
-                    enter(families.entry(found.signs.clone()).or_default(), &found);
+                    enter(families.entry(found.signs).or_default(), &found.place);
                 }
             }
         }
@@ -192,7 +182,7 @@ fn finish(landscape: &LensLandscape, lens: &Lens, mut used: usize) -> (DescentEn
         let (mut halted, last) = run(optimizer, MOST_EVALUATIONS.saturating_sub(used));
         used += last.evaluations;
         let Some(end) = last.end else { return (DescentEnd::Unfinished, used) };
-        let gains_nothing = last.best >= (1.0 - SAME) * before;
+        let gains_nothing = last.best >= (1.0 - SAME_MINIMUM) * before;
         if gains_nothing && end.is_minimum() {
             let found = EndedDescent::new(landscape, &halted, tolerance);
             let end = found.map_or(DescentEnd::Lost, |found| DescentEnd::Minimum(Box::new(found)));
@@ -237,49 +227,15 @@ fn run(mut optimizer: Box<dyn Optimizer>, most: usize) -> (Lens, OptimizationPro
 
 impl EndedDescent {
     fn new(landscape: &LensLandscape, lens: &Lens, tolerance: f64) -> Result<Self, MeritError> {
-        let merit = landscape.merit(lens, tolerance)?;
         let lens = landscape.with_variables(lens);
-        let values = merit.values(&lens);
-        let sum = merit.evaluate(&values, DerivativeLevel::Normal)?;
-        Ok(Self {
-            signs: curvature_signs(&lens, landscape.focal_length()),
-            values: DVector::from_vec(values),
-            normal: sum.normal,
-            value: sum.value,
-            merit,
-        })
-    }
-
-    /// The square of the distance of another minimum.
-    fn square_distance(&self, other: &Minimum) -> f64 {
-        if other.values.len() != self.values.len() {
-            return f64::INFINITY;
-        }
-        let step = &other.values - &self.values;
-        step.dot(&(&self.normal * &step)) / self.value.max(other.merit).max(f64::MIN_POSITIVE)
-    }
-
-    fn is_same(&self, other: &Minimum) -> bool {
-        match self.square_distance(other) {
-            near if near < SAME => true,
-            near if near < DIFFERENT => !self.has_hill_before(other),
-            _ => false,
-        }
-    }
-
-    /// True if the merit between two minima rises above both, or does not exist.
-    fn has_hill_before(&self, other: &Minimum) -> bool {
-        let top = (1.0 + HILL) * self.value.max(other.merit);
-        BETWEEN.iter().any(|part| {
-            let between = &self.values + (&other.values - &self.values) * *part;
-            !self.merit.value(between.as_slice()).is_ok_and(|merit| merit <= top)
-        })
+        let signs = curvature_signs(&lens, landscape.focal_length());
+        Ok(Self { signs, place: MinimumPlace::new(landscape, &lens, tolerance)? })
     }
 }
 
 /// Enters a minimum among those with the same signs; of two that are the same the better one is kept.
-fn enter(family: &mut Vec<Minimum>, found: &EndedDescent) {
-    match family.iter_mut().find(|known| found.is_same(known)) {
+fn enter(family: &mut Vec<Minimum>, found: &MinimumPlace) {
+    match family.iter_mut().find(|known| found.is_same(&known.values, known.merit)) {
         Some(known) => {
             known.found += 1;
             if found.value < known.merit {

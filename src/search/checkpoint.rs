@@ -197,6 +197,7 @@ fn fixed_settings(settings: &SearchSettings) -> Result<Value, SearchError> {
     if fixed.method != SearchMethod::BruteForce {
         (fixed.moves, fixed.gradients) = (None, None);
     }
+    fixed.reservoir = Some(settings.reservoir_capacity());
     let corrupt = |error: serde_json::Error| CheckpointError::Corrupt {
         file: "settings".to_owned(),
         what: error.to_string(),

@@ -18,6 +18,7 @@ mod projection;
 mod quadratic_program;
 mod restoration;
 mod separate;
+mod shortest_change;
 mod trust_region;
 
 pub use adam::{Adam, AdamMoments};

@@ -4,6 +4,7 @@ use super::constrained::{LimitedTrustRegion, scaled_room};
 use super::kink::KinkTrial;
 use super::limit_values::{LimitValues, LimitedPoint};
 use super::quadratic_program::QuadraticProgram;
+use super::shortest_change::shortest_change;
 use super::trust_region::HessianModel;
 use nalgebra::{DMatrix, DVector};
 
@@ -15,12 +16,30 @@ const MARGIN_REACH: f64 = 1e-3;
 /// The violation relative to the margin above which a limit gets one.
 const MARGIN_SHARE: f64 = 0.1;
 
+/// Limits of which some are broken, by their derivatives in scaled parameters.
+struct BrokenLimits {
+    rows: DMatrix<f64>,
+    /// The range by which each may change.
+    bounds: Vec<[f64; 2]>,
+    /// The range of each parameter.
+    room: Vec<[f64; 2]>,
+    /// The distance to the bounds.
+    distance: f64,
+}
+
 impl LimitedTrustRegion {
     /// The smallest change, in the scales of the parameters, after which limits hold by their
     /// derivatives as far as they can.
     pub fn correction(&self, limits: &LimitValues, room: &[[f64; 2]]) -> Option<DVector<f64>> {
-        let count = self.region.scales.len();
-        self.nearest(limits, room, &DMatrix::identity(count, count), &DVector::zeros(count))
+        let broken = self.broken_limits(limits, room)?;
+        let is_near =
+            |change: &DVector<f64>| change.norm() <= CORRECTION_REACH[0] * broken.distance;
+        let BrokenLimits { rows, bounds, room, .. } = &broken;
+        if let Some(change) = shortest_change(rows, bounds, room).filter(is_near) {
+            return Some(change.component_div(&self.region.scales));
+        }
+        let count = rows.ncols();
+        self.nearest(&broken, &DMatrix::identity(count, count), &DVector::zeros(count))
     }
 
     /// The change after which limits of the current point, whose bounds may be others, hold by their
@@ -33,29 +52,32 @@ impl LimitedTrustRegion {
     ) -> Option<DVector<f64>> {
         let hessian = self.convex_hessian(point, HessianModel::GaussNewton);
         let gradient = 2.0 * point.objective.half_gradient.component_div(&self.region.scales);
-        self.nearest(&self.branches.with_branches(limits), room, &hessian, &gradient)
+        let broken = self.broken_limits(&self.branches.with_branches(limits), room)?;
+        self.nearest(&broken, &hessian, &gradient)
+    }
+
+    /// The limits by their derivatives in scaled parameters; `None` if they hold already.
+    fn broken_limits(&self, limits: &LimitValues, room: &[[f64; 2]]) -> Option<BrokenLimits> {
+        let rows = self.effective_rows(limits);
+        let distance = distance(limits, &rows);
+        let (bounds, room) = (limits.room(&limits.values), scaled_room(room, &self.region.scales));
+        let is_broken = distance > 0.0 && distance.is_finite();
+        is_broken.then_some(BrokenLimits { rows, bounds, room, distance })
     }
 
     /// The minimum of a quadratic function in scaled parameters near the current point where limits
-    /// hold by their derivatives as far as they can; `None` if they do already.
+    /// hold by their derivatives as far as they can.
     fn nearest(
         &self,
-        limits: &LimitValues,
-        room: &[[f64; 2]],
+        broken: &BrokenLimits,
         hessian: &DMatrix<f64>,
         gradient: &DVector<f64>,
     ) -> Option<DVector<f64>> {
-        let scales = &self.region.scales;
-        let rows = self.effective_rows(limits);
-        let distance = distance(limits, &rows);
-        if !(distance > 0.0 && distance.is_finite()) {
-            return None;
-        }
-        let (bounds, room) = (&limits.room(&limits.values), &scaled_room(room, scales));
+        let BrokenLimits { rows, bounds, room, distance } = broken;
         let program = |radius| QuadraticProgram {
             hessian,
             gradient,
-            rows: &rows,
+            rows,
             bounds,
             room,
             radius,
@@ -65,7 +87,7 @@ impl LimitedTrustRegion {
         let found = program(near).solve();
         let found = found.or_else(|| program(far.min(self.natural.max(near))).solve());
         let found = found.or_else(|| program(near).solve_relaxed())?;
-        Some(found.x.component_div(scales))
+        Some(found.x.component_div(&self.region.scales))
     }
 
     /// Limits of which the broken ones have bounds that are closer by a margin, as far as a short

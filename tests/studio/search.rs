@@ -115,6 +115,13 @@ fn thin(value: f64) -> ConstraintMargin {
     }
 }
 
+/// A request for a search by some method.
+fn request_for(method: SearchMethod) -> StructureSearchRequest {
+    let mut request = StructureSearchRequest::default();
+    request.plan.settings.method = method;
+    request
+}
+
 /// A search from the double Gauss that has found two lenses, and stands somehow.
 fn searching(standing: RunStatus) -> SessionView {
     let mut view = view();
@@ -146,7 +153,7 @@ fn searching(standing: RunStatus) -> SessionView {
     };
     statistics.kinds.insert(MutationKind::AddSinglet, tally);
     let run = StructureSearchSnapshot {
-        request: Arc::default(),
+        request: Arc::new(request_for(SearchMethod::Restore)),
         start: found(0, 0.1),
         best: found(1, 0.02),
         reservoir: vec![found(1, 0.02), found(0, 0.1)],
@@ -229,7 +236,7 @@ fn search_settings_are_labelled() {
     for (part, fields) in [
         ("Manufacturing limits", ["Least glass on the axis", "Steepness", "set"].as_slice()),
         ("Weights of the mutations", &["Weight of glue at the start"]),
-        ("Sampler", &["C", "Gamma", "Longest descent", "Retained lenses", "Error of spots"]),
+        ("Descents and retained lenses", &["Retained lenses", "Error of spots"]),
     ] {
         press(&mut harness, part);
         for field in fields {
@@ -237,6 +244,37 @@ fn search_settings_are_labelled() {
         }
         press(&mut harness, part);
     }
+}
+
+/// Settings that a method does not depend on are not shown.
+#[test]
+fn settings_follow_the_method() {
+    let mut harness = panel(view());
+    press(&mut harness, "Descents and retained lenses");
+    let shown = |harness: &Harness<'_, PanelState<SearchPanel>>| {
+        ["C", "Gamma", "Longest descent", "several of each pattern", "one of each pattern"]
+            .map(|name| harness.query_by_label(name).is_some())
+    };
+    assert_eq!(shown(&harness), [false, false, false, true, false]);
+    for (method, expected) in [
+        ("RESTORE", [true, true, true, false, true]),
+        ("Metropolis-Hastings", [false, false, true, false, true]),
+    ] {
+        press(&mut harness, "Search method");
+        press(&mut harness, method);
+        assert_eq!(shown(&harness), expected, "{method}");
+    }
+}
+
+#[test]
+fn a_method_without_a_temperature_shows_none() {
+    let mut view = searching(RunStatus::Running);
+    assert!(panel(view.clone()).query_by_label("Reheat").is_some());
+    let run = Arc::make_mut(view.structure_search.run.snapshot.as_mut().unwrap());
+    run.request = Arc::new(request_for(SearchMethod::IteratedLocalSearch));
+    let harness = panel(view);
+    assert!(harness.query_by_label("Reheat").is_none());
+    assert!(harness.query_by_label("Temperature").is_none());
 }
 
 #[test]

@@ -91,8 +91,6 @@ pub(super) struct SearchArgs {
 
 /// Maximum number of gradients if neither it nor a duration is given.
 const DEFAULT_ITERATIONS: u64 = 12_000;
-/// The number of minima that an iterated local search holds.
-const MINIMA: usize = 16;
 /// Seconds between two checkpoints.
 const SAVED: f64 = 3.0;
 
@@ -244,9 +242,6 @@ impl SearchArgs {
         let (descent, sampler) = stored.unzip();
         plan.local.method = self.plan_args.descent.or(descent).unwrap_or(plan.local.method);
         plan.settings.method = self.method.or(sampler).unwrap_or(plan.settings.method);
-        if plan.settings.method == SearchMethod::IteratedLocalSearch {
-            plan.settings.reservoir = self.plan_args.reservoir.unwrap_or(MINIMA);
-        }
         let usual = if self.minutes.is_none() { Some(DEFAULT_ITERATIONS) } else { None };
         plan.settings.gradients = self.iterations.or(usual);
         plan.settings.check().map_err(search_error)?;

@@ -102,7 +102,7 @@ pub(in crate::cli) struct SearchPlanArgs {
 
     /// The number of lenses in the reservoir; absent: 5, or 16 different minima of an iterated local search
     #[arg(long, value_name = "N")]
-    pub(in crate::cli) reservoir: Option<usize>,
+    reservoir: Option<usize>,
 
     /// Temperature of `restore` and `metropolis`, 0 or more, or `infinite`; absent: the density of the start is one half
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
@@ -252,7 +252,7 @@ impl SearchPlanArgs {
         let settings = &mut plan.settings;
         settings.chains = self.chains.unwrap_or(settings.chains);
         settings.trials = self.trials.unwrap_or(settings.trials);
-        settings.reservoir = self.reservoir.unwrap_or(settings.reservoir);
+        settings.reservoir = self.reservoir;
         settings.temperature = self.temperature.map(|heat| heat.0);
         settings.c = self.c.unwrap_or(settings.c);
         settings.gamma = self.gamma.unwrap_or(settings.gamma);

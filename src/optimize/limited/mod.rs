@@ -44,6 +44,8 @@ const KEPT: f64 = 1e-9;
 const RESTORED: f64 = 1e-11;
 /// The number of corrections of a trial.
 const TRIAL_CORRECTIONS: usize = 4;
+/// The part of a violation that a correction leaves at most if another one is worth trying.
+const CORRECTED: f64 = 0.5;
 
 #[derive(Debug)]
 pub(super) struct LimitedOptimizer {
@@ -179,10 +181,13 @@ impl LimitedOptimizer {
         let gradient = self.method.projected_gradient(&self.point, &step, &room);
         let first = *self.first_gradient.get_or_insert(gradient);
         let is_kept = self.point.limits.violation() <= SLACK;
-        self.stuck =
-            if step.is_relaxed && !self.gains_limits(&step, &room) { self.stuck + 1 } else { 0 };
+        let gains_limits = !step.is_relaxed || self.gains_limits(&step.values);
+        self.stuck = if gains_limits { 0 } else { self.stuck + 1 };
         if self.stuck >= PATIENCE {
-            return Err(OptimizationEnd::Conflict);
+            if !self.may_gain_limits(&room) {
+                return Err(OptimizationEnd::Conflict);
+            }
+            self.stuck = 0;
         }
         if is_kept && gradient <= SMALL_GRADIENT * first {
             return Err(OptimizationEnd::Gradient);
@@ -214,13 +219,18 @@ impl LimitedOptimizer {
         self.idle_gain * self.point.objective.value
     }
 
-    /// True if a step brings the limits closer by a thousandth, or a longer one would.
-    fn gains_limits(&self, step: &LimitedStep, room: &[[f64; 2]]) -> bool {
+    /// True if limits of such values are closer by a thousandth.
+    fn gains_limits(&self, values: &DVector<f64>) -> bool {
         let limits = &self.point.limits;
         let sum = |values: &DVector<f64>| limits.excesses(values).abs().sum();
-        let gains = |values: &DVector<f64>| sum(values) < 0.999 * sum(&limits.values);
-        let farther = || self.method.correction(limits, room);
-        gains(&step.values) || farther().is_some_and(|change| gains(&limits.linearized(&change)))
+        sum(values) < 0.999 * sum(&limits.values)
+    }
+
+    /// True if a step of any length brings the limits closer.
+    fn may_gain_limits(&self, room: &[[f64; 2]]) -> bool {
+        let limits = &self.point.limits;
+        let change = self.method.correction(limits, room);
+        change.is_some_and(|change| self.gains_limits(&limits.linearized(&change)))
     }
 
     /// The decrease of the merit that the derivatives promise: of the step itself and, if that is
@@ -328,7 +338,7 @@ impl LimitedOptimizer {
             .zip(step.values.iter())
             .map(|([low, high], promised)| [low.min(*promised), high.max(*promised)])
             .collect();
-        let mut values = proposed.to_vec();
+        let (mut values, mut before) = (proposed.to_vec(), f64::INFINITY);
         for _ in 0..TRIAL_CORRECTIONS {
             let merit = &self.state.merit;
             let Ok(found) = merit.mechanical_limits(&values, DerivativeLevel::Gradient) else {
@@ -336,9 +346,11 @@ impl LimitedOptimizer {
             };
             let found = limit_values(&self.state, &found);
             let aimed = found.with_bounds(&aims[..found.bounds.len()]);
-            if aimed.violation() <= RESTORED {
+            let violation = aimed.violation();
+            if violation <= RESTORED || violation > CORRECTED * before {
                 break;
             }
+            before = violation;
             match self.corrected(&values, &aimed) {
                 // Beyond the length of the step the derivatives tell nothing.
                 Some(next) if self.is_near(proposed, &next, step) => values = next,

@@ -105,7 +105,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         let best = !breaks_limits && self.update_best(&entry);
         let offer = if breaks_limits {
             OfferOutcome::RejectedLimits
-        } else if is_iterated && self.settings.minima {
+        } else if self.settings.retains_minima() {
             self.reservoir.offer_minimum(entry, |one, other| landscape.is_same_minimum(one, other))
         } else {
             self.reservoir.offer(entry)

@@ -5,20 +5,21 @@
 
 use super::LensLandscape;
 use crate::lens::{Lens, Medium, glass};
-use crate::merit::{DerivativeLevel, Merit};
-use nalgebra::DVector;
+use crate::merit::{DerivativeLevel, Merit, MeritError};
+use nalgebra::{DMatrix, DVector};
 
 /// The curvature relative to the focal length below which a surface counts as plane.
 const PLANE: f64 = 0.05;
 /// The differences of index and Abbe number below which two glasses are alike.
 const ALIKE: [f64; 2] = [0.02, 3.0];
-/// The square of the distance below which two minima are the same, and that above which they are not.
-const SAME: f64 = 1e-2;
+/// The relative change of the merit, the square of the distance, below which two minima are the same.
+pub const SAME_MINIMUM: f64 = 1e-2;
+/// That above which they are not.
 const DIFFERENT: f64 = 1.0;
 /// The relative height of a hill that parts two minima.
 const HILL: f64 = 1e-2;
 /// The places between two minima where the merit is evaluated.
-const BETWEEN: [f64; 3] = [0.25, 0.5, 0.75];
+const BETWEEN: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 
 /// The signs of the curvatures of a lens and of the powers of its glasses, with 0 for planes.
 pub fn curvature_signs(lens: &Lens, focal_length: f64) -> String {
@@ -63,24 +64,63 @@ impl LensLandscape {
     /// True if two lenses are near in the metric of the residuals of the first one; `None` if it has no
     /// merit, or if they have different variables.
     fn is_near(&self, one: &Lens, other: &Lens) -> Option<bool> {
-        let merit = self.merit(one, self.local.tolerance).ok()?;
-        let [from, to] = [one, other].map(|lens| DVector::from_vec(merit.values(lens)));
-        let same_rows = one.surfaces.len() == other.surfaces.len();
-        let step = (same_rows && from.len() == to.len()).then(|| &to - &from)?;
-        let sum = merit.evaluate(from.as_slice(), DerivativeLevel::Normal).ok()?;
-        let square = step.dot(&(&sum.normal * &step)) / sum.value.abs().max(f64::MIN_POSITIVE);
-        Some(match square {
-            near if near < SAME => true,
-            near if near < DIFFERENT => !has_hill_between(&merit, &from, &step, sum.value),
-            _ => false,
-        })
+        let found = MinimumPlace::new(self, one, self.local.tolerance).ok()?;
+        let other = DVector::from_vec(found.merit.values(other));
+        let has_same_rows = other.len() == found.values.len();
+        let value = has_same_rows.then(|| found.merit.value(other.as_slice()).ok()).flatten()?;
+        Some(found.is_same(&other, value))
     }
 }
 
-/// True if the merit on the way from one lens to another rises above both ends, or does not exist.
-fn has_hill_between(merit: &Merit, from: &DVector<f64>, step: &DVector<f64>, value: f64) -> bool {
-    let at = |part: f64| merit.value((from + step * part).as_slice()).ok();
-    let Some(end) = at(1.0) else { return true };
-    let top = (1.0 + HILL) * value.max(end);
-    BETWEEN.iter().any(|part| !at(*part).is_some_and(|merit| merit <= top))
+/// A place where a merit function has a minimum.
+#[derive(Debug)]
+pub struct MinimumPlace {
+    merit: Merit,
+    /// The values of the variables.
+    pub values: DVector<f64>,
+    /// `Jᵀ J` of the residuals.
+    normal: DMatrix<f64>,
+    /// The merit.
+    pub value: f64,
+}
+
+impl MinimumPlace {
+    /// The place of a lens, with spots of a relative tolerance.
+    ///
+    /// # Errors
+    /// The lens has no merit.
+    pub fn new(landscape: &LensLandscape, lens: &Lens, tolerance: f64) -> Result<Self, MeritError> {
+        let merit = landscape.merit(lens, tolerance)?;
+        let values = merit.values(lens);
+        let sum = merit.evaluate(&values, DerivativeLevel::Normal)?;
+        let values = DVector::from_vec(values);
+        Ok(Self { merit, values, normal: sum.normal, value: sum.value })
+    }
+
+    /// True if a place with this merit is the same minimum.
+    pub fn is_same(&self, other: &DVector<f64>, merit: f64) -> bool {
+        match self.square_distance(other, merit) {
+            near if near < SAME_MINIMUM => true,
+            near if near < DIFFERENT => !self.has_hill_before(other, merit),
+            _ => false,
+        }
+    }
+
+    /// The square of the distance, `dxᵀ Jᵀ J dx / F`.
+    fn square_distance(&self, other: &DVector<f64>, merit: f64) -> f64 {
+        if other.len() != self.values.len() {
+            return f64::INFINITY;
+        }
+        let step = other - &self.values;
+        step.dot(&(&self.normal * &step)) / self.value.abs().max(merit.abs()).max(f64::MIN_POSITIVE)
+    }
+
+    /// True if the merit between two places rises above both, or does not exist.
+    fn has_hill_before(&self, other: &DVector<f64>, merit: f64) -> bool {
+        let top = (1.0 + HILL) * self.value.max(merit);
+        BETWEEN.iter().any(|part| {
+            let between = &self.values + (other - &self.values) * *part;
+            !self.merit.value(between.as_slice()).is_ok_and(|merit| merit <= top)
+        })
+    }
 }

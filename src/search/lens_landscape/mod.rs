@@ -26,7 +26,7 @@ pub use aspheres::AsphereGain;
 pub use descent_settings::DescentSettings;
 pub use finalize::{CrossCheck, FinalizedLens, GlassSubstitution, UnlistedGlass, finalize};
 pub use local_move::gains_little;
-pub use minimum::{curvature_signs, has_same_glasses};
+pub use minimum::{MinimumPlace, SAME_MINIMUM, curvature_signs, has_same_glasses};
 pub use open_apertures::with_open_apertures;
 pub use plan::{SearchPlan, SearchSetupError, describe_left_out, run};
 pub use saddle::SaddlePoint;

@@ -103,7 +103,8 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         }
         let jobs = brute_force_jobs(landscape.element_count(&start), settings);
         let start = ReservoirEntry::new(landscape, 0, loss, start);
-        let mut reservoir = Reservoir::new(settings.reservoir, settings.one_per_topology);
+        let mut reservoir =
+            Reservoir::new(settings.reservoir_capacity(), settings.one_per_topology);
         let offer = reservoir.offer(start.clone());
         let mut run = Self {
             temperature: settings.temperature.unwrap_or(Temperature::at_half_density(loss)),

@@ -5,6 +5,10 @@ use crate::math::format_short;
 use crate::search::SearchError;
 use serde::{Deserialize, Serialize};
 
+/// The usual capacity of a reservoir with one point of each topology.
+const USUAL_RESERVOIR: usize = 5;
+/// The usual capacity of a reservoir of different minima, of which one topology has many.
+const USUAL_MINIMA: usize = 16;
 /// The maximum number of chains: each needs the memory of a descent and a turn in every round.
 const MAX_CHAINS: usize = 1024;
 
@@ -22,8 +26,8 @@ pub struct SearchSettings {
     /// The number of trials in a race of an iterated local search, which has a chain for each of them and
     /// one for the best point in place of [`SearchSettings::chains`].
     pub trials: usize,
-    /// The capacity of the reservoir.
-    pub reservoir: usize,
+    /// The capacity of the reservoir; `None` for the usual one of the method.
+    pub reservoir: Option<usize>,
     /// True to hold at most one point of each topology in the reservoir.
     pub one_per_topology: bool,
     /// True for an iterated local search that holds different minima in its reservoir, in place of one point
@@ -62,7 +66,7 @@ impl Default for SearchSettings {
             seed: 1,
             chains: 4,
             trials: 8,
-            reservoir: 5,
+            reservoir: None,
             one_per_topology: true,
             minima: true,
             gamma: 0.02,
@@ -87,8 +91,8 @@ impl SearchSettings {
     pub fn check(&self) -> Result<(), SearchError> {
         let wrong =
             |name, found: String, expected| Err(SearchError::Setting { name, found, expected });
-        let counts =
-            [("chains", self.chains), ("trials", self.trials), ("reservoir", self.reservoir)];
+        let reservoir = ("reservoir", self.reservoir_capacity());
+        let counts = [("chains", self.chains), ("trials", self.trials), reservoir];
         for (name, count) in counts {
             if count == 0 {
                 return wrong(name, "0".to_owned(), "1 or more");
@@ -143,6 +147,18 @@ impl SearchSettings {
         }
     }
 
+    /// The capacity of the reservoir: that of the settings, or 16 for the different minima of an iterated
+    /// local search and 5 otherwise.
+    pub fn reservoir_capacity(&self) -> usize {
+        let usual = if self.retains_minima() { USUAL_MINIMA } else { USUAL_RESERVOIR };
+        self.reservoir.unwrap_or(usual)
+    }
+
+    /// True if the reservoir holds different minima, in place of one point of each topology.
+    pub fn retains_minima(&self) -> bool {
+        self.method == SearchMethod::IteratedLocalSearch && self.minima
+    }
+
     /// The number of chains of a run.
     pub(in crate::search) fn chain_count(&self) -> usize {
         match self.method {
@@ -169,6 +185,13 @@ pub enum SearchMethod {
     /// equally long descents.
     #[serde(rename = "brute")]
     BruteForce,
+}
+
+impl SearchMethod {
+    /// True if the method depends on a temperature.
+    pub fn has_temperature(self) -> bool {
+        matches!(self, Self::Restore | Self::Metropolis)
+    }
 }
 
 /// Langevin steps (4.10) with a diagonal preconditioner `M`: `θ' = θ − ε M ∇L min(1, 1/(2 T)) + √(ε

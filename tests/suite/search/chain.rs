@@ -259,7 +259,7 @@ fn flat_and_huge_losses_stay_finite() {
 
 #[test]
 fn a_reservoir_of_one_and_a_single_chain_work() {
-    let one = SearchSettings { reservoir: 1, chains: 1, ..settings(SearchMethod::Restore) };
+    let one = SearchSettings { reservoir: Some(1), chains: 1, ..settings(SearchMethod::Restore) };
     let mut run = begin(&one);
     to_the_end(&mut run, &Rugged::default());
     assert_eq!(run.reservoir().entries().len(), 1);
@@ -271,7 +271,7 @@ fn invalid_settings_are_refused_by_name() {
     let good = SearchSettings::default();
     let wrong = [
         ("chains", SearchSettings { chains: 0, ..good.clone() }),
-        ("reservoir", SearchSettings { reservoir: 0, ..good.clone() }),
+        ("reservoir", SearchSettings { reservoir: Some(0), ..good.clone() }),
         ("longest", SearchSettings { longest: 0, ..good.clone() }),
         ("gamma", SearchSettings { gamma: 1.1, ..good.clone() }),
         ("gamma", SearchSettings { gamma: f64::NAN, ..good.clone() }),

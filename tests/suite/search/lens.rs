@@ -132,7 +132,7 @@ fn searches_with_extreme_settings_stay_finite() {
     for plan in [
         with(&|s| s.temperature = temperature(0.0)),
         with(&|s| s.temperature = temperature(f64::INFINITY)),
-        with(&|s| s.reservoir = 1),
+        with(&|s| s.reservoir = Some(1)),
         with(&|s| s.gamma = 1.0),
         with(&|s| (s.c, s.chains) = (0.0, 1)),
         with(&|s| s.method = SearchMethod::Metropolis),

@@ -16,7 +16,7 @@ fn plan(rules: SearchRules) -> SearchPlan {
         method,
         gradients: Some(1500),
         seed: 2,
-        reservoir: 12,
+        reservoir: Some(12),
         ..SearchSettings::default()
     };
     SearchPlan { rules, settings, ..SearchPlan::default() }

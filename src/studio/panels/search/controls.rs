@@ -168,8 +168,12 @@ fn order_choice(ui: &mut Ui, order: &mut CardOrder) {
     named_list(ui, combo, "Order of the lenses");
 }
 
+/// The temperature of a method that depends on one.
 pub(super) fn temperature(ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
     let ShownSearch { view, run } = search;
+    if !run.request.plan.settings.method.has_temperature() {
+        return;
+    }
     ui.weak("Temperature").on_hover_text(
         "The merit at which the density of a lens is 1/e. At a higher temperature, descents from \
          worse lenses last longer",

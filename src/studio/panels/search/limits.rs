@@ -1,11 +1,11 @@
-//! Limits of a search: manufacturing, light of the fields, and settings of the sampler.
+//! Limits of a search: manufacturing, light of the fields, and settings of the descents.
 
 use egui::{ComboBox, DragValue, Grid, RichText, Ui};
 
 use super::setup::{drag, length, optional};
 use crate::lens::{FieldPoint, Lens};
 use crate::search::lens_landscape::{DescentSettings, SearchPlan};
-use crate::search::{SearchRules, SearchSettings, Termination};
+use crate::search::{SearchMethod, SearchRules, SearchSettings, Termination};
 use crate::studio::form::named_list;
 use crate::studio::panels::field_name;
 
@@ -71,15 +71,36 @@ const ENDS: [(Termination, &str, &str); 3] = [
 
 const RELATIVE: &str = "The rate of improvement counts, not the merit at the start";
 
-/// The settings of the sampler.
-pub(super) fn sampler_section(ui: &mut Ui, plan: &mut SearchPlan) {
-    ui.collapsing("Sampler", |ui| {
-        Grid::new("sampler").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {
-            termination_row(ui, &mut plan.settings.termination);
-            descent_rows(ui, &mut plan.settings);
+/// The settings of the descents that the chosen method depends on.
+pub(super) fn descents_section(ui: &mut Ui, plan: &mut SearchPlan) {
+    ui.collapsing("Descents and retained lenses", |ui| {
+        Grid::new("descents").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {
+            let settings = &mut plan.settings;
+            if settings.method == SearchMethod::Restore {
+                restore_rows(ui, settings);
+            }
+            if settings.method.has_temperature() {
+                ui.weak("Longest descent");
+                let hint = "Maximum moves per descent";
+                drag(ui, "Longest descent", &mut settings.longest, 1..=1_000_000, 1.0, hint);
+                ui.end_row();
+            }
+            retained_row(ui, settings);
             move_rows(ui, &mut plan.local);
         });
     });
+}
+
+/// The settings of algorithm 1.
+fn restore_rows(ui: &mut Ui, settings: &mut SearchSettings) {
+    termination_row(ui, &mut settings.termination);
+    ui.weak("C");
+    drag(ui, "C", &mut settings.c, 0.0..=10.0, 0.002, "A larger value makes descents shorter");
+    ui.end_row();
+    ui.weak("γ");
+    let hint = "The probability that a descent starts from a random lens instead of a retained one";
+    drag(ui, "Gamma", &mut settings.gamma, 0.0..=1.0, 0.002, hint);
+    ui.end_row();
 }
 
 fn termination_row(ui: &mut Ui, chosen: &mut Termination) {
@@ -94,24 +115,21 @@ fn termination_row(ui: &mut Ui, chosen: &mut Termination) {
     ui.end_row();
 }
 
-fn descent_rows(ui: &mut Ui, settings: &mut SearchSettings) {
-    ui.weak("C");
-    drag(ui, "C", &mut settings.c, 0.0..=10.0, 0.002, "A larger value makes descents shorter");
-    ui.end_row();
-    ui.weak("γ");
-    let hint = "The probability that a descent starts from a random lens instead of a retained one";
-    drag(ui, "Gamma", &mut settings.gamma, 0.0..=1.0, 0.002, hint);
-    ui.end_row();
-    ui.weak("Longest descent");
-    let hint = "Maximum moves per descent";
-    drag(ui, "Longest descent", &mut settings.longest, 1..=1_000_000, 1.0, hint);
-    ui.end_row();
+fn retained_row(ui: &mut Ui, settings: &mut SearchSettings) {
     ui.weak("Retained lenses");
     ui.horizontal(|ui| {
         let hint = "The size of the reservoir of lenses that are mutated";
-        drag(ui, "Retained lenses", &mut settings.reservoir, 1..=100, 0.05, hint);
-        let hint = "At most one of each pattern of glass and air";
-        ui.checkbox(&mut settings.one_per_topology, "one of each pattern").on_hover_text(hint);
+        let mut capacity = settings.reservoir_capacity();
+        if drag(ui, "Retained lenses", &mut capacity, 1..=100, 0.05, hint) {
+            settings.reservoir = Some(capacity);
+        }
+        if settings.method == SearchMethod::IteratedLocalSearch {
+            let hint = "Retain all different minima, not only the best one of each pattern of glass and air";
+            ui.checkbox(&mut settings.minima, "several of each pattern").on_hover_text(hint);
+        } else {
+            let hint = "At most one of each pattern of glass and air";
+            ui.checkbox(&mut settings.one_per_topology, "one of each pattern").on_hover_text(hint);
+        }
     });
     ui.end_row();
 }

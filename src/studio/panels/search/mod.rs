@@ -31,10 +31,9 @@ use replay::Replay;
 use setup::SearchSetup;
 
 /// The introduction that is shown before the first search.
-const INTRODUCTION: &str = "Which lens of another structure is better? Chains descend from the \
-    design, add, \
-    remove, glue, split, bend, flip and exchange elements, and retain the best lens of \
-    every pattern of glass and air.\n\
+const INTRODUCTION: &str = "Which lens of another structure is better? The search \
+    adds, removes, glues, splits, bends, flips and exchanges elements, optimizes what comes of it, \
+    and retains the best different lenses.\n\
     The design does not change until one of their lenses is accepted.";
 
 /// The height of the bar of the selected lens: buttons and two lines.

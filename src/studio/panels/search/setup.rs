@@ -1,4 +1,4 @@
-//! The settings of a search: the sampler, the structure, the goal, the end.
+//! The settings of a search: the method, the structure, the goal, the end.
 
 use std::ops::RangeInclusive;
 
@@ -106,7 +106,7 @@ impl SearchSetup {
         });
         limits::limits_section(ui, &mut self.request.plan.rules);
         self.weights_section(ui);
-        limits::sampler_section(ui, &mut self.request.plan);
+        limits::descents_section(ui, &mut self.request.plan);
     }
 
     fn method_rows(&mut self, ui: &mut Ui) {
