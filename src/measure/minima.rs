@@ -36,6 +36,7 @@ const BATCH: u64 = 32;
 /// The parts of the way from the lens to random numbers that are tried: of many surfaces few random ones
 /// form an image.
 const SPREADS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
+
 /// The minima that descents from random lenses have found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MinimaCount {

@@ -27,13 +27,21 @@ struct BrokenLimits {
     distance: f64,
 }
 
+impl BrokenLimits {
+    /// The lengths up to which corrections are tried where a step has this natural length.
+    fn reaches(&self, natural: f64) -> [f64; 2] {
+        let [near, far] = CORRECTION_REACH.map(|reach| reach * self.distance);
+        [near, far.min(natural.max(near))]
+    }
+}
+
 impl LimitedTrustRegion {
     /// The smallest change, in the scales of the parameters, after which limits hold by their
     /// derivatives as far as they can.
     pub fn correction(&self, limits: &LimitValues, room: &[[f64; 2]]) -> Option<DVector<f64>> {
         let broken = self.broken_limits(limits, room)?;
-        let is_near =
-            |change: &DVector<f64>| change.norm() <= CORRECTION_REACH[0] * broken.distance;
+        let [_, far] = broken.reaches(self.natural);
+        let is_near = |change: &DVector<f64>| change.norm() <= far;
         let BrokenLimits { rows, bounds, room, .. } = &broken;
         if let Some(change) = shortest_change(rows, bounds, room).filter(is_near) {
             return Some(change.component_div(&self.region.scales));
@@ -73,7 +81,7 @@ impl LimitedTrustRegion {
         hessian: &DMatrix<f64>,
         gradient: &DVector<f64>,
     ) -> Option<DVector<f64>> {
-        let BrokenLimits { rows, bounds, room, distance } = broken;
+        let BrokenLimits { rows, bounds, room, .. } = broken;
         let program = |radius| QuadraticProgram {
             hessian,
             gradient,
@@ -83,9 +91,9 @@ impl LimitedTrustRegion {
             radius,
             elastic: None,
         };
-        let [near, far] = CORRECTION_REACH.map(|reach| reach * distance);
+        let [near, far] = broken.reaches(self.natural);
         let found = program(near).solve();
-        let found = found.or_else(|| program(far.min(self.natural.max(near))).solve());
+        let found = found.or_else(|| program(far).solve());
         let found = found.or_else(|| program(near).solve_relaxed())?;
         Some(found.x.component_div(&self.region.scales))
     }

@@ -1,6 +1,6 @@
 //! The shortest change under linear limits: the limits that are broken are taken as equalities, and those
-//! that the change would break are added, until all hold. A few limits are solved for so without a quadratic
-//! program; where limits depend on one another nothing is returned.
+//! that the change would break are added, until all hold. This solves for a few limits without a quadratic
+//! program; where limits depend on one another, or one would have to be released, nothing is returned.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -39,7 +39,7 @@ struct ActiveLimit<'a> {
 }
 
 /// The shortest `x` with `bounds[i][0] ≤ rows[i] · x ≤ bounds[i][1]` and `room[j][0] ≤ x[j] ≤ room[j][1]`. Rows of
-/// zeros are left out. `None` if there is none, or if limits depend on one another.
+/// zeros are left out. `None` if this method does not find it; there may be one nevertheless.
 pub(super) fn shortest_change(
     rows: &DMatrix<f64>,
     bounds: &[[f64; 2]],

@@ -252,13 +252,21 @@ fn settings_follow_the_method() {
     let mut harness = panel(view());
     press(&mut harness, "Descents and retained lenses");
     let shown = |harness: &Harness<'_, PanelState<SearchPanel>>| {
-        ["C", "Gamma", "Longest descent", "several of each pattern", "one of each pattern"]
-            .map(|name| harness.query_by_label(name).is_some())
+        [
+            "C",
+            "Longest descent",
+            "several of each pattern",
+            "one of each pattern",
+            "Steps per move",
+            "Weights of the mutations",
+        ]
+        .map(|name| harness.query_all_by_label(name).count() > 0)
     };
-    assert_eq!(shown(&harness), [false, false, false, true, false]);
+    assert_eq!(shown(&harness), [false, false, true, false, true, true]);
     for (method, expected) in [
-        ("RESTORE", [true, true, true, false, true]),
-        ("Metropolis-Hastings", [false, false, true, false, true]),
+        ("RESTORE", [true, true, false, true, true, true]),
+        ("Metropolis-Hastings", [false, true, false, true, false, true]),
+        ("Brute force", [false, false, false, true, true, false]),
     ] {
         press(&mut harness, "Search method");
         press(&mut harness, method);

@@ -69,7 +69,7 @@ pub(super) struct LimitedOptimizer {
     unchecked: usize,
     interval: usize,
     idle: usize,
-    /// The consecutive steps after which the limits could not hold.
+    /// The steps since the limits last came closer, or could have.
     stuck: usize,
     /// The restarts of the method so far.
     restarts: usize,
@@ -181,8 +181,8 @@ impl LimitedOptimizer {
         let gradient = self.method.projected_gradient(&self.point, &step, &room);
         let first = *self.first_gradient.get_or_insert(gradient);
         let is_kept = self.point.limits.violation() <= SLACK;
-        let gains_limits = !step.is_relaxed || self.gains_limits(&step.values);
-        self.stuck = if gains_limits { 0 } else { self.stuck + 1 };
+        let makes_progress = !step.is_relaxed || self.gains_limits(&step.values);
+        self.stuck = if makes_progress { 0 } else { self.stuck + 1 };
         if self.stuck >= PATIENCE {
             if !self.may_gain_limits(&room) {
                 return Err(OptimizationEnd::Conflict);
@@ -219,14 +219,15 @@ impl LimitedOptimizer {
         self.idle_gain * self.point.objective.value
     }
 
-    /// True if limits of such values are closer by a thousandth.
+    /// True if the sum of the violations at these values of the limits is smaller than the present one by
+    /// more than a thousandth.
     fn gains_limits(&self, values: &DVector<f64>) -> bool {
         let limits = &self.point.limits;
         let sum = |values: &DVector<f64>| limits.excesses(values).abs().sum();
         sum(values) < 0.999 * sum(&limits.values)
     }
 
-    /// True if a step of any length brings the limits closer.
+    /// True if a correction that the trust region does not confine brings the limits closer.
     fn may_gain_limits(&self, room: &[[f64; 2]]) -> bool {
         let limits = &self.point.limits;
         let change = self.method.correction(limits, room);
@@ -338,7 +339,8 @@ impl LimitedOptimizer {
             .zip(step.values.iter())
             .map(|([low, high], promised)| [low.min(*promised), high.max(*promised)])
             .collect();
-        let (mut values, mut before) = (proposed.to_vec(), f64::INFINITY);
+        let mut values = proposed.to_vec();
+        let mut last: Option<(Vec<f64>, f64)> = None;
         for _ in 0..TRIAL_CORRECTIONS {
             let merit = &self.state.merit;
             let Ok(found) = merit.mechanical_limits(&values, DerivativeLevel::Gradient) else {
@@ -347,15 +349,16 @@ impl LimitedOptimizer {
             let found = limit_values(&self.state, &found);
             let aimed = found.with_bounds(&aims[..found.bounds.len()]);
             let violation = aimed.violation();
-            if violation <= RESTORED || violation > CORRECTED * before {
-                break;
+            match last {
+                Some((earlier, before)) if violation > before => return earlier,
+                Some((_, before)) if violation > CORRECTED * before => break,
+                _ if violation <= RESTORED => break,
+                _ => {}
             }
-            before = violation;
-            match self.corrected(&values, &aimed) {
-                // Beyond the length of the step the derivatives tell nothing.
-                Some(next) if self.is_near(proposed, &next, step) => values = next,
-                _ => break,
-            }
+            // Beyond the length of the step the derivatives tell nothing.
+            let is_near = |next: &Vec<f64>| self.is_near(proposed, next, step);
+            let Some(next) = self.corrected(&values, &aimed).filter(is_near) else { break };
+            last = Some((std::mem::replace(&mut values, next), violation));
         }
         values
     }

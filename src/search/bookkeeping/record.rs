@@ -15,7 +15,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     {
         let loss = landscape.loss(&point);
         let entry = ReservoirEntry::new(landscape, self.lineage.total(), loss, point.clone());
-        let offer = self.reservoir.offer(entry.clone());
+        let offer = self.offer(landscape, entry.clone());
         if offer.is_accepted() {
             let record = StructureChange::Received.into();
             let gradients = 0;
@@ -34,6 +34,18 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             self.take_over(landscape, &entry);
         }
         offer
+    }
+
+    /// Offers a point to the reservoir: as a minimum, or as the best point of its topology.
+    fn offer<L>(&mut self, landscape: &L, entry: ReservoirEntry<P>) -> OfferOutcome
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        if self.settings.retains_minima() {
+            self.reservoir.offer_minimum(entry, |one, other| landscape.is_same_minimum(one, other))
+        } else {
+            self.reservoir.offer(entry)
+        }
     }
 
     /// Applies one event of a chain.
@@ -103,13 +115,8 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             && !self.keep_limits(landscape, &mut entry);
         let (number, loss, point) = (entry.number, entry.loss, entry.point.clone());
         let best = !breaks_limits && self.update_best(&entry);
-        let offer = if breaks_limits {
-            OfferOutcome::RejectedLimits
-        } else if self.settings.retains_minima() {
-            self.reservoir.offer_minimum(entry, |one, other| landscape.is_same_minimum(one, other))
-        } else {
-            self.reservoir.offer(entry)
-        };
+        let offer =
+            if breaks_limits { OfferOutcome::RejectedLimits } else { self.offer(landscape, entry) };
         if is_iterated && self.best.number == number && self.best.point != point {
             self.find_best_again(landscape);
         }

@@ -58,21 +58,20 @@ impl LensLandscape {
         if signs(one) != signs(other) || !has_same_glasses(one, other) {
             return false;
         }
-        self.is_near(one, other).unwrap_or(false)
+        self.is_near(one, other)
     }
 
-    /// True if two lenses are near in the metric of the residuals of the first one; `None` if it has no
-    /// merit, or if they have different variables.
-    fn is_near(&self, one: &Lens, other: &Lens) -> Option<bool> {
-        let found = MinimumPlace::new(self, one, self.local.tolerance).ok()?;
+    /// True if two lenses with the same surfaces have a merit, and are near in the metric of the residuals of
+    /// the first one.
+    fn is_near(&self, one: &Lens, other: &Lens) -> bool {
+        let Ok(found) = MinimumPlace::new(self, one, self.local.tolerance) else { return false };
         let other = DVector::from_vec(found.merit.values(other));
-        let has_same_rows = other.len() == found.values.len();
-        let value = has_same_rows.then(|| found.merit.value(other.as_slice()).ok()).flatten()?;
-        Some(found.is_same(&other, value))
+        let value = found.merit.value(other.as_slice());
+        value.is_ok_and(|value| found.is_same(&other, value))
     }
 }
 
-/// A place where a merit function has a minimum.
+/// A lens at a minimum in the metric of its residuals.
 #[derive(Debug)]
 pub struct MinimumPlace {
     merit: Merit,
@@ -97,7 +96,7 @@ impl MinimumPlace {
         Ok(Self { merit, values, normal: sum.normal, value: sum.value })
     }
 
-    /// True if a place with this merit is the same minimum.
+    /// True if a lens with these values of the variables and this merit lies at the same minimum.
     pub fn is_same(&self, other: &DVector<f64>, merit: f64) -> bool {
         match self.square_distance(other, merit) {
             near if near < SAME_MINIMUM => true,
@@ -106,7 +105,7 @@ impl MinimumPlace {
         }
     }
 
-    /// The square of the distance, `dxᵀ Jᵀ J dx / F`.
+    /// The square of the distance, `dxᵀ Jᵀ J dx / F` with the larger merit of both.
     fn square_distance(&self, other: &DVector<f64>, merit: f64) -> f64 {
         if other.len() != self.values.len() {
             return f64::INFINITY;

@@ -28,7 +28,7 @@ pub struct SearchSettings {
     pub trials: usize,
     /// The capacity of the reservoir; `None` for the usual one of the method.
     pub reservoir: Option<usize>,
-    /// True to hold at most one point of each topology in the reservoir.
+    /// True to hold at most one point of each topology in the reservoir, unless it holds different minima.
     pub one_per_topology: bool,
     /// True for an iterated local search that holds different minima in its reservoir, in place of one point
     /// of each topology.

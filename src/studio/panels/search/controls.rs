@@ -175,8 +175,8 @@ pub(super) fn temperature(ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Ac
         return;
     }
     ui.weak("Temperature").on_hover_text(
-        "The merit at which the density of a lens is 1/e. At a higher temperature, descents from \
-         worse lenses last longer",
+        "The merit at which the density of a lens is 1/e. At a higher temperature, RESTORE descends \
+         longer from worse lenses, and Metropolis-Hastings accepts more steps that lead to them",
     );
     let mut value = run.temperature.value();
     let speed = 0.01 * value.max(f64::MIN_POSITIVE);

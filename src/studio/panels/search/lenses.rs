@@ -263,7 +263,7 @@ pub(super) fn lens_buttons(
         ActionButton::new("Unpin", view.structure_search.run.is_active(), command).hint(hint)
     } else {
         let command = StructureSearchCommand::Control(SteerCommand::Pin(number));
-        let hint = "Start every new descent from this lens";
+        let hint = "Start every new descent of an iterated search or of RESTORE from this lens";
         ActionButton::new("Pin", view.structure_search.run.is_active(), command).hint(hint)
     };
     let buttons = [

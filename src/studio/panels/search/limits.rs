@@ -79,14 +79,17 @@ pub(super) fn descents_section(ui: &mut Ui, plan: &mut SearchPlan) {
             if settings.method == SearchMethod::Restore {
                 restore_rows(ui, settings);
             }
-            if settings.method.has_temperature() {
+            if matches!(settings.method, SearchMethod::Restore | SearchMethod::Metropolis) {
                 ui.weak("Longest descent");
                 let hint = "Maximum moves per descent";
                 drag(ui, "Longest descent", &mut settings.longest, 1..=1_000_000, 1.0, hint);
                 ui.end_row();
             }
             retained_row(ui, settings);
-            move_rows(ui, &mut plan.local);
+            if settings.method != SearchMethod::Metropolis {
+                steps_row(ui, &mut plan.local.steps);
+            }
+            merit_rows(ui, &mut plan.local);
         });
     });
 }
@@ -118,15 +121,17 @@ fn termination_row(ui: &mut Ui, chosen: &mut Termination) {
 fn retained_row(ui: &mut Ui, settings: &mut SearchSettings) {
     ui.weak("Retained lenses");
     ui.horizontal(|ui| {
-        let hint = "The size of the reservoir of lenses that are mutated";
+        let hint = "The number of lenses that are retained";
         let mut capacity = settings.reservoir_capacity();
         if drag(ui, "Retained lenses", &mut capacity, 1..=100, 0.05, hint) {
             settings.reservoir = Some(capacity);
         }
         if settings.method == SearchMethod::IteratedLocalSearch {
-            let hint = "Retain all different minima, not only the best one of each pattern of glass and air";
+            let hint =
+                "Retain different minima of one pattern of glass and air, not only the best one";
             ui.checkbox(&mut settings.minima, "several of each pattern").on_hover_text(hint);
-        } else {
+        }
+        if !settings.retains_minima() {
             let hint = "At most one of each pattern of glass and air";
             ui.checkbox(&mut settings.one_per_topology, "one of each pattern").on_hover_text(hint);
         }
@@ -134,10 +139,13 @@ fn retained_row(ui: &mut Ui, settings: &mut SearchSettings) {
     ui.end_row();
 }
 
-fn move_rows(ui: &mut Ui, local: &mut DescentSettings) {
+fn steps_row(ui: &mut Ui, steps: &mut usize) {
     ui.weak("Steps per move");
-    drag(ui, "Steps per move", &mut local.steps, 1..=1000, 0.1, "Gradient steps per move");
+    drag(ui, "Steps per move", steps, 1..=1000, 0.1, "Gradient steps per move");
     ui.end_row();
+}
+
+fn merit_rows(ui: &mut Ui, local: &mut DescentSettings) {
     ui.weak("Spot tolerance");
     ui.horizontal(|ui| {
         let mut percent = 100.0 * local.tolerance;

@@ -32,9 +32,9 @@ use setup::SearchSetup;
 
 /// The introduction that is shown before the first search.
 const INTRODUCTION: &str = "Which lens of another structure is better? The search \
-    adds, removes, glues, splits, bends, flips and exchanges elements, optimizes what comes of it, \
-    and retains the best different lenses.\n\
-    The design does not change until one of their lenses is accepted.";
+    adds, removes, glues, splits, bends, flips and exchanges elements, optimizes each changed lens, \
+    and retains the best lenses that differ.\n\
+    The design does not change until one of them is accepted.";
 
 /// The height of the bar of the selected lens: buttons and two lines.
 const SELECTION_HEIGHT: f32 = 62.0;

@@ -105,7 +105,9 @@ impl SearchSetup {
             self.limit_rows(ui);
         });
         limits::limits_section(ui, &mut self.request.plan.rules);
-        self.weights_section(ui);
+        if self.request.plan.settings.method != SearchMethod::BruteForce {
+            self.weights_section(ui);
+        }
         limits::descents_section(ui, &mut self.request.plan);
     }
 
@@ -138,7 +140,7 @@ impl SearchSetup {
                 drag(ui, "Trials", &mut settings.trials, 1..=64, 0.05, hint);
                 ui.weak("trials");
             } else {
-                let hint = "Parallel descents that share the retained lenses";
+                let hint = "The number of parallel chains";
                 drag(ui, "Chains", &mut settings.chains, 1..=64, 0.05, hint);
                 ui.weak("chains");
             }

@@ -175,7 +175,9 @@ pub(super) fn outcome_text<P>(node: &LineageNode<P>) -> String {
         Some(OfferOutcome::AlreadyPresent(other)) => format!("; the same as lens {other}"),
         Some(OfferOutcome::RejectedLimits) => "; no lens near it keeps every limit".to_owned(),
         Some(OfferOutcome::RejectedSameTopology(other)) => {
-            format!("; not retained: lens {other} of the same pattern is at least as good")
+            format!(
+                "; not retained: lens {other} of the same pattern, or at the same minimum, is at least as good"
+            )
         }
         Some(OfferOutcome::RejectedWorse) => "; not retained: all retained lenses are at least as \
             good"
