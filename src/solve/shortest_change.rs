@@ -127,7 +127,7 @@ mod tests {
         check(&[[0.0, 0.0], [0.0, 3.0]], &[[5.0, 5.0], [3.0, 3.0]], [WIDE; 2], [0.0, 1.0]);
     }
 
-    /// What the shortest change to the first limit would break is kept: another limit, and a range.
+    /// Another limit, or a range, that the shortest change to the first limit would break is kept.
     #[test]
     fn limits_that_a_change_would_break_are_kept() {
         let rows = [[1.0, 1.0], [1.0, 0.0]];
