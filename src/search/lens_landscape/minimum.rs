@@ -98,20 +98,20 @@ impl MinimumPlace {
 
     /// True if a lens with these values of the variables and this merit lies at the same minimum.
     pub fn is_same(&self, other: &DVector<f64>, merit: f64) -> bool {
-        match self.square_distance(other, merit) {
+        match self.square_distance(other) {
             near if near < SAME_MINIMUM => true,
             near if near < DIFFERENT => !self.has_hill_before(other, merit),
             _ => false,
         }
     }
 
-    /// The square of the distance, `dxᵀ Jᵀ J dx / F` with the larger merit of both.
-    fn square_distance(&self, other: &DVector<f64>, merit: f64) -> f64 {
+    /// The square of the distance, `dxᵀ Jᵀ J dx / F` with the merit of this lens.
+    fn square_distance(&self, other: &DVector<f64>) -> f64 {
         if other.len() != self.values.len() {
             return f64::INFINITY;
         }
         let step = other - &self.values;
-        step.dot(&(&self.normal * &step)) / self.value.abs().max(merit.abs()).max(f64::MIN_POSITIVE)
+        step.dot(&(&self.normal * &step)) / self.value.abs().max(f64::MIN_POSITIVE)
     }
 
     /// True if the merit between two places rises above both, or does not exist.
