@@ -79,7 +79,7 @@ pub struct MinimumPlace {
     pub values: DVector<f64>,
     /// `Jᵀ J` of the residuals.
     normal: DMatrix<f64>,
-    /// The merit.
+    /// The merit in mm².
     pub value: f64,
 }
 
@@ -96,7 +96,7 @@ impl MinimumPlace {
         Ok(Self { merit, values, normal: sum.normal, value: sum.value })
     }
 
-    /// True if a lens with these values of the variables and this merit lies at the same minimum.
+    /// True if a lens with these values of the variables and this merit in mm² lies at the same minimum.
     pub fn is_same(&self, other: &DVector<f64>, merit: f64) -> bool {
         match self.square_distance(other) {
             near if near < SAME_MINIMUM => true,

@@ -176,7 +176,8 @@ pub(super) fn outcome_text<P>(node: &LineageNode<P>) -> String {
         Some(OfferOutcome::RejectedLimits) => "; no lens near it keeps every limit".to_owned(),
         Some(OfferOutcome::RejectedSameTopology(other)) => {
             format!(
-                "; not retained: lens {other} of the same pattern, or at the same minimum, is at least as good"
+                "; not retained: lens {other} of the same pattern, or at the same minimum, is at least as \
+                 good"
             )
         }
         Some(OfferOutcome::RejectedWorse) => "; not retained: all retained lenses are at least as \
